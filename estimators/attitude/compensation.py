@@ -20,7 +20,7 @@ from simrail.estimators.attitude.compensation_kernel import (
 
 from simrail.core.columns import ACCEL, ODOMETRY
 from simrail.core.jit import FloatArray
-from simrail.recording.recording import Recording, odometry_of
+from simrail.recording.recording import Recording, odometry_of, rows_of
 from simrail.track.design import Straight, TrackDesign, TrackFrame
 
 
@@ -150,9 +150,7 @@ def track_motion(recording: Recording, *, printed: bool = False) -> TrackMotion:
 
 def _course(recording: Recording, *, printed: bool) -> Course:
     """What the kernels take of the map and of the odometry."""
-    place, speed, rate = (
-        np.ascontiguousarray(odometry_of(recording)[name].to_numpy(dtype=np.float64)) for name in ODOMETRY
-    )
+    place, speed, rate = rows_of(odometry_of(recording), ODOMETRY)
     return Course(*recording.track.pieces, _on_map(recording, place), speed, rate, printed)
 
 
@@ -187,10 +185,10 @@ class GravityForce(NamedTuple):
 
 def gravity_and_curves(recording: Recording, *, compensated: bool, printed: bool = False) -> GravityForce:
     """`gravity_force`, and of what curves the compensation is made."""
-    measured = np.ascontiguousarray(recording.imu[list(ACCEL)].to_numpy(dtype=np.float64))
+    measured, n = rows_of(recording.imu, ACCEL), len(recording.imu)
     if not compensated:
-        return GravityForce(measured, np.empty((4, 0)))
-    found = GravityForce(np.empty_like(measured), np.empty((4, len(measured))))
+        return GravityForce(np.column_stack(measured), np.empty((4, 0)))
+    found = GravityForce(np.empty((n, 3)), np.empty((4, n)))
     _, r_y, r_z = recording.mount_position_m
     force_less_motion(_course(recording, printed=printed), measured, r_y, r_z, *found)
     return found

@@ -77,15 +77,20 @@ def frame_motion(course: Course, out: FloatArray) -> None:
 
 @njit
 def force_less_motion(
-    course: Course, signals: FloatArray, y: float, z: float, force: FloatArray, curves: FloatArray
+    course: Course,
+    signals: tuple[FloatArray, ...],
+    y: float,
+    z: float,
+    force: FloatArray,
+    curves: FloatArray,
 ) -> None:
     """Specific force less the acceleration of a place (0, y, z) of the frame.
 
     Parameters
     ----------
     course : Course
-    signals : ndarray (n, 3)
-        Specific force, m/s2.
+    signals : tuple of ndarray (n,)
+        Specific force along X, Y and Z, m/s2.
     y, z : float
         m.
     force : ndarray (n, 3), out
@@ -105,7 +110,7 @@ def force_less_motion(
             for j in range(count):
                 k = first + j
                 moved = found[k] + y * found[3 * BLOCK + k] + z * found[6 * BLOCK + k]
-                force[begin + j, axis] = signals[begin + j, axis] - moved
+                force[begin + j, axis] = signals[axis][begin + j] - moved
         if curves.shape[1] > 0:
             for row in range(4):
                 for j in range(count):

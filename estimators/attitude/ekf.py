@@ -176,13 +176,13 @@ class AttitudeEkf:
         return [found[i] for i in range(len(recordings))]
 
     def _estimate(self, recording: Recording, room: _Room, considered: FloatArray) -> Estimate:
-        states = np.empty((len(room.angles), 6))
+        states = np.empty((6, len(room.angles)))
         with_deviations(room.angles, room.covariance, considered, states)
         index = recording.imu.index
         return Estimate(
-            states=pd.DataFrame(states, index=index, columns=[*ATTITUDE, *ATTITUDE_SD]),
+            states=pd.DataFrame(states.T, index=index, columns=[*ATTITUDE, *ATTITUDE_SD], copy=False),
             mount=recording.mount,
-            innovations=pd.DataFrame(room.innovations, index=index, columns=list(INNOVATION)),
+            innovations=pd.DataFrame(room.innovations, index=index, columns=list(INNOVATION), copy=False),
             covariance=room.covariance.reshape(-1, 3, 3),
             covariance_of=ATTITUDE,
         )

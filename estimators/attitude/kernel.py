@@ -15,24 +15,6 @@ Covariance = tuple[float, float, float, float, float, float]
 
 
 @njit_inline
-def correct(
-    p: Covariance, d_roll: float, d_pitch: float, h0: float, h1: float, error: float, variance: float
-) -> tuple[Covariance, float, float, float]:
-    """`simrail.estimators.kalman.update` for a row (h0, h1, 0), with heading only considered (Schmidt).
-
-    ``error`` is z - h(x) at the predicted state, ``d_roll`` and ``d_pitch`` what earlier rows moved it by.
-    Returns P, both moves, and e^2/s.
-    """
-    p00, p01, p02, p11, p12, p22 = p
-    v0, v1, v2 = h0 * p00 + h1 * p01, h0 * p01 + h1 * p11, h0 * p02 + h1 * p12
-    inverse = 1.0 / (h0 * v0 + h1 * v1 + variance)
-    g0, g1 = v0 * inverse, v1 * inverse
-    e = error - h0 * d_roll - h1 * d_pitch
-    p = (p00 - g0 * v0, p01 - g0 * v1, p02 - g0 * v2, p11 - g1 * v1, p12 - g1 * v2, p22)
-    return p, d_roll + g0 * e, d_pitch + g1 * e, e * e * inverse
-
-
-@njit_inline
 def propagate(
     p: Covariance, a00: float, a01: float, a10: float, a20: float, a21: float, q: float
 ) -> Covariance:
@@ -89,25 +71,42 @@ def predicted(
 def updated(
     angles: Three, p: Covariance, turns: Turns, force: Three, noise: Three, gravity: float
 ) -> tuple[Three, Covariance, Turns, tuple[float, float, float, float]]:
-    """One update of the EKF; the last is the innovation, and its normalised square."""
+    """One update of the EKF; the last is the innovation, and its normalised square.
+
+    For roll and pitch, with P their covariance and M = H' R^-1 H, of two rows, their adjoints at hand:
+
+        (P^-1 + M)^-1 = (P + det P adj M)/D,    (I + P M)^-1 = adj(I + P M)/D
+        D = det(I + P M) = 1 + tr P M + det P det M,    NIS = e' R^-1 (e - H dx)
+
+    Heading is only considered: its covariance with the two goes the way of their errors, (I + P M)^-1.
+    """
     roll, pitch, yaw = angles
     sr, cr, sp, cp = turns
+    p00, p01, p02, p11, p12, p22 = p
     # Innovation, z less gravity in body axes, and the three rows of its Jacobian (EQUATIONS 2.2).
-    ex = force[0] + gravity * sp
-    ey = force[1] - gravity * sr * cp
-    ez = force[2] - gravity * cr * cp
-    p, d_roll, d_pitch, nis = correct(p, 0.0, 0.0, 0.0, -gravity * cp, ex, noise[0])
-    h0, h1 = gravity * cr * cp, -gravity * sr * sp
-    p, d_roll, d_pitch, square = correct(p, d_roll, d_pitch, h0, h1, ey, noise[1])
-    nis += square
-    h0, h1 = -gravity * sr * cp, -gravity * cr * sp
-    p, d_roll, d_pitch, square = correct(p, d_roll, d_pitch, h0, h1, ez, noise[2])
-    nis += square
+    lift, lean = gravity * cp, gravity * sp
+    ex, ey, ez = force[0] + lean, force[1] - lift * sr, force[2] - lift * cr
+    x1, y0, y1, z0, z1 = -lift, lift * cr, -lean * sr, -lift * sr, -lean * cr
+    ix, iy, iz = 1.0 / noise[0], 1.0 / noise[1], 1.0 / noise[2]
+    m00 = y0 * y0 * iy + z0 * z0 * iz
+    m01 = y0 * y1 * iy + z0 * z1 * iz
+    m11 = x1 * x1 * ix + y1 * y1 * iy + z1 * z1 * iz
+    b0 = y0 * (ey * iy) + z0 * (ez * iz)
+    b1 = x1 * (ex * ix) + y1 * (ey * iy) + z1 * (ez * iz)
+    area = p00 * p11 - p01 * p01
+    c00, c01 = p00 * m00 + p01 * m01, p00 * m01 + p01 * m11
+    c10, c11 = p01 * m00 + p11 * m01, p01 * m01 + p11 * m11
+    inverse = 1.0 / (1.0 + (c00 + c11) + area * (m00 * m11 - m01 * m01))
+    q00, q01, q11 = (p00 + area * m11) * inverse, (p01 - area * m01) * inverse, (p11 + area * m00) * inverse
+    d_roll, d_pitch = q00 * b0 + q01 * b1, q01 * b0 + q11 * b1
+    p02, p12 = (p02 + (c11 * p02 - c01 * p12)) * inverse, (p12 + (c00 * p12 - c10 * p02)) * inverse
+    nis = ex * ix * (ex - x1 * d_pitch)
+    nis += ey * iy * (ey - y0 * d_roll - y1 * d_pitch) + ez * iz * (ez - z0 * d_roll - z1 * d_pitch)
     roll += d_roll
     pitch += d_pitch
     sr, cr = sine_cosine(roll)
     sp, cp = sine_cosine(pitch)
-    return (roll, pitch, yaw), p, (sr, cr, sp, cp), (ex, ey, ez, nis)
+    return (roll, pitch, yaw), (q00, q01, p02, q11, p12, p22), (sr, cr, sp, cp), (ex, ey, ez, nis)
 
 
 Quaternion = tuple[float, float, float, float]
@@ -159,13 +158,14 @@ def attitude_ekf(
 ) -> None:
     """Run the Euler-angle EKF (paper 000, Eqs. 21-39; EQUATIONS 2.2).
 
-    Predict with x += step_s f(x, w) and A = I + step_s F, update with h(x) = C^T g e_z by three scalar
-    updates that are linearised at the predicted state, which equals the block update because the
-    accelerometer's noise is independent between its axes. Heading is unobservable from gravity: its
-    gain is held at zero and its cross-covariances are carried along (Schmidt).
+    Predict with x += step_s f(x, w) and A = I + step_s F, update with h(x) = C^T g e_z with all three axes at
+    once, linearised at the predicted state, in the form of the information of two states (`updated`). Heading
+    is unobservable from gravity: its gain is held at zero and its cross-covariances are carried along
+    (Schmidt).
 
-    Specialised by hand: the covariance is six numbers in registers, which stays symmetric by construction. On
-    the arrays of `simrail.estimators.kalman` the same filter takes 2.6 times as long.
+    Specialised by hand: the covariance is six numbers in registers, which stays symmetric by construction,
+    and what an update waits for is one division and one series, not three divisions in turn. By three scalar
+    updates in registers a step takes 1.3 times as long, on the arrays of `simrail.estimators.kalman` 5 times.
 
     Parameters
     ----------
@@ -219,13 +219,13 @@ def with_deviations(
     ----------
     angles, considered : ndarray (n, 3)
     covariance : ndarray (n, 9), in and out
-    states : ndarray (n, 6), out
+    states : ndarray (6, n), out
     """
-    for k in range(angles.shape[0]):
-        for axis in range(3):
-            covariance[k, 4 * axis] += considered[k, axis]
-            states[k, axis] = angles[k, axis]
-            states[k, 3 + axis] = math.sqrt(covariance[k, 4 * axis])
+    for axis in range(3):
+        for k in range(angles.shape[0]):
+            variance = covariance[k, 4 * axis] + considered[k, axis]
+            covariance[k, 4 * axis] = variance
+            states[axis, k], states[3 + axis, k] = angles[k, axis], math.sqrt(variance)
 
 
 @njit

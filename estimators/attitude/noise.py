@@ -44,7 +44,7 @@ from simrail.estimators.attitude.rest_bias import RestBias
 
 from simrail.core.columns import ODOMETRY, ODOMETRY_SD
 from simrail.core.jit import FloatArray, njit, njit_borrowed, njit_inline
-from simrail.recording.recording import ImuSheet, Recording, odometry_of
+from simrail.recording.recording import ImuSheet, Recording, odometry_of, rows_of
 
 PAPER = {"paper_initial": (1e-2, 1.5e-2), "paper_final": (1e-3, 15.0)}
 """Paper 000, Section 6: the printed "Q_{k-1}" and the sd of the accelerometer in m/s2."""
@@ -62,6 +62,8 @@ MODEL_RATE_INTENSITY = 1e-10
 MODEL_FORCE_SD = 1e-3
 """m/s2: rounding of counts and of the gravity model; keeps a noiseless accelerometer's R positive."""
 
+_BLOCK = 64
+"""Samples whose time constants are worked out together, several in one instruction."""
 
 _NEWTON_STEPS = 12
 """More than any start needs."""
@@ -130,9 +132,7 @@ def recommended_noise(
     n = len(recording.imu)
     step_s = 1.0 / sheet.rate_hz
     motion = odometry_of(recording)
-    speed, place_sd, speed_sd, push_sd = (
-        np.ascontiguousarray(motion[name].to_numpy(dtype=np.float64)) for name in (ODOMETRY[1], *ODOMETRY_SD)
-    )
+    speed, place_sd, speed_sd, push_sd = rows_of(motion, (ODOMETRY[1], *ODOMETRY_SD))
     curves = np.empty((4, 0)) if curves is None else curves
     white = sheet.gyro_noise_radpsqrts**2 + MODEL_RATE_INTENSITY
     sensor = sheet.accel_noise_mpsqrts**2 + MODEL_FORCE_SD**2 * step_s
@@ -158,25 +158,33 @@ def _fill(
     force: FloatArray,
     considered: FloatArray,
 ) -> None:
-    """Work out what the module's docstring derives, by samples; ``curves`` of no columns is no frame."""
+    """Work out what the module's docstring derives, by blocks; ``curves`` of no columns is no frame."""
     step_s, gravity, white, sensor, vibration, level = given
-    third, tau = white * gravity**2, 0.0
-    for i in range(speed.shape[0]):
-        swing = (vibration * speed[i]) ** 2
-        tau = _time_constant(sensor, swing, third, 4.0 * bias[i] * gravity**2, tau)
-        of_body = (sensor + 2.0 * swing / tau) / step_s
-        force[i, 0] = force[i, 1] = force[i, 2] = of_body
-        if curves.shape[1] > 0:
+    swing, growth, tau, is_open = np.empty(_BLOCK), np.empty(_BLOCK), np.empty(_BLOCK), np.empty(_BLOCK)
+    third, near, n = white * gravity**2, 0.0, speed.shape[0]
+    for begin in range(0, n, _BLOCK):
+        count = min(_BLOCK, n - begin)
+        for j in range(count):
+            swing[j] = (vibration * speed[begin + j]) ** 2
+            growth[j] = 4.0 * bias[begin + j] * gravity**2
+        _time_constants(sensor, third, swing, growth, near, count, tau, is_open)
+        near = tau[count - 1]
+        for j in range(count):
+            i = begin + j
+            of_body = (sensor + 2.0 * swing[j] / tau[j]) / step_s
+            force[i, 0] = force[i, 1] = force[i, 2] = of_body
+            considered[i, 0] = considered[i, 1] = level
+            considered[i, 2] = bias[i] * ((i - samples[i]) * step_s) ** 2
+            process[i] = (white + 4.0 * bias[i] * tau[j]) * step_s
+        if curves.shape[1] == 0:
+            continue
+        for j in range(count):
+            i = begin + j
+            share, square, twice = tau[j] / step_s, speed[i] ** 2, 2.0 * speed[i] * speed_sd[i]
+            along = square * place_sd[i]
             force[i, 0] += push_sd[i] ** 2
-            share, square = tau / step_s, speed[i] ** 2
-            for axis in range(1, 3):
-                row = 2 * axis - 2
-                by_place = square * curves[row + 1, i] * place_sd[i]
-                by_pace = 2.0 * speed[i] * curves[row, i] * speed_sd[i]
-                force[i, axis] += (by_place**2 + by_pace**2) * share
-        considered[i, 0] = considered[i, 1] = level
-        considered[i, 2] = bias[i] * ((i - samples[i]) * step_s) ** 2
-        process[i] = (white + 4.0 * bias[i] * tau) * step_s
+            force[i, 1] += ((along * curves[1, i]) ** 2 + (twice * curves[0, i]) ** 2) * share
+            force[i, 2] += ((along * curves[3, i]) ** 2 + (twice * curves[2, i]) ** 2) * share
 
 
 def bias_variance(sheet: ImuSheet, rest_s: FloatArray) -> FloatArray:
@@ -211,34 +219,74 @@ def time_constant(
     ndarray (n,)
         s.
     """
-    found = np.empty(len(swing))
-    for i in range(len(swing)):
-        found[i] = _time_constant(sensor, swing[i], white * gravity**2, 4.0 * bias[i] * gravity**2, 0.0)
+    found, near = np.empty(len(swing)), 0.0
+    _time_constants(
+        sensor,
+        white * gravity**2,
+        swing,
+        4.0 * bias * gravity**2,
+        near,
+        len(swing),
+        found,
+        np.empty(len(swing)),
+    )
     return found
 
 
 @njit_borrowed
-def _time_constant(sensor: float, swing: float, third: float, fourth: float, near: float) -> float:
-    """`time_constant` of one sample, by Newton's method from that of the sample before, if it is near.
+def _time_constants(
+    sensor: float,
+    third: float,
+    swing: FloatArray,
+    fourth: FloatArray,
+    near: float,
+    count: int,
+    tau: FloatArray,
+    is_open: FloatArray,
+) -> None:
+    """`time_constant` of the first ``count`` samples, by Newton's method from one for all, if it is near.
 
     fourth tau^4 + third tau^3 - sensor tau - 2 swing = 0 has one positive root, above which the left side
     is convex: from a start above it, or a little below, the steps fall towards the root and never below. The
-    last step is so small that what it leaves is rounding, so that the start leaves no trace.
+    last step is so small that what it leaves is rounding, so that the start leaves no trace. Each sample
+    stops by itself, so that none depends on those that come after it.
+
+    Parameters
+    ----------
+    sensor, third, near : float
+        ``near`` is the time constant of a sample before, or 0.
+    swing, fourth : ndarray
+    count : int
+    tau : ndarray, out
+    is_open : ndarray, work
+        1 where another step is due, else 0.
     """
-    tau = near
-    if tau > 0.0:
-        step, slope = _newton(sensor, swing, third, fourth, tau)
-        tau = tau - step if slope > 0.0 and abs(step) <= _NEAR * tau else 0.0
-    if tau <= 0.0:
-        tau = max(math.sqrt(2.0 * sensor / third), (4.0 * swing / third) ** (1.0 / 3.0))
-        if fourth > 0.0:
-            other = max((2.0 * sensor / fourth) ** (1.0 / 3.0), math.sqrt(math.sqrt(4.0 * swing / fourth)))
-            tau = min(tau, other)
-    for _ in range(_NEWTON_STEPS):
-        step, _ = _newton(sensor, swing, third, fourth, tau)
-        tau -= step
-        if abs(step) <= _DONE * tau:
-            break
+    for j in range(count):
+        step, slope = _newton(sensor, swing[j], third, fourth[j], near)
+        is_near = near > 0.0 and slope > 0.0 and abs(step) <= _NEAR * near
+        tau[j], is_open[j] = near - step, 1.0 if is_near else 0.0
+    for j in range(count):
+        if is_open[j] == 0.0:
+            tau[j], is_open[j] = _start(sensor, swing[j], third, fourth[j]), 1.0
+    left, steps = 1.0, 0
+    while left > 0.0 and steps < _NEWTON_STEPS:
+        left, steps = 0.0, steps + 1
+        for j in range(count):
+            step, _ = _newton(sensor, swing[j], third, fourth[j], tau[j])
+            step = step if is_open[j] > 0.0 else 0.0
+            tau[j] -= step
+            is_open[j] = 1.0 if abs(step) > _DONE * tau[j] else 0.0
+        for j in range(count):
+            left += is_open[j]
+
+
+@njit_borrowed
+def _start(sensor: float, swing: float, third: float, fourth: float) -> float:
+    """Where Newton's method begins without a time constant near by."""
+    tau: float = max(math.sqrt(2.0 * sensor / third), (4.0 * swing / third) ** (1.0 / 3.0))
+    if fourth > 0.0:
+        other = max((2.0 * sensor / fourth) ** (1.0 / 3.0), math.sqrt(math.sqrt(4.0 * swing / fourth)))
+        tau = min(tau, other)
     return tau
 
 

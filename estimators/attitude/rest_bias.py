@@ -27,7 +27,7 @@ import numpy as np
 
 from simrail.core.columns import GYRO
 from simrail.core.jit import FloatArray, njit, njit_borrowed
-from simrail.recording.recording import Recording
+from simrail.recording.recording import Recording, rows_of
 from simrail.recording.standstill import SETTLE_S, SHORTEST_S, guard_s, motion_times
 
 CORRELATION_S = 300.0
@@ -77,17 +77,17 @@ def rest_bias(recording: Recording, *, enabled: bool = True, with_variance: bool
         Row k uses samples older than `simrail.recording.standstill.guard_s` only, and only samples from
         rests.
     """
-    gyro = np.ascontiguousarray(recording.imu[list(GYRO)].to_numpy(dtype=np.float64))
-    sheet, n = recording.imu_sheet, gyro.shape[0]
+    sheet, n = recording.imu_sheet, len(recording.imu)
     wander = (WANDER_PER_INSTABILITY * sheet.gyro_bias_instability_radps) ** 2
     unknown = sheet.gyro_turn_on_bias_radps**2 / 3.0 + wander
-    found = RestBias(np.zeros((n, 3)), np.zeros(n), np.full(n if with_variance else 0, unknown))
+    spread = np.full(n if with_variance else 0, unknown)
     if not enabled:
-        return found
+        return RestBias(np.zeros((n, 3)), np.zeros(n), spread)
+    found = RestBias(np.empty((n, 3)), np.empty(n), spread)
     times = recording.imu.index.to_numpy(dtype=np.float64)
     moves, guard = motion_times(recording), guard_s(recording)
     average_rests(
-        running_sums(gyro),
+        running_sums(*rows_of(recording.imu, GYRO)),
         times,
         moves,
         max(SETTLE_S, guard),
@@ -104,16 +104,16 @@ def rest_bias(recording: Recording, *, enabled: bool = True, with_variance: bool
 
 
 @njit
-def running_sums(values: FloatArray) -> FloatArray:
-    """Sums (n + 1, 3) of what is before each row of ``values`` (n, 3).
+def running_sums(first: FloatArray, second: FloatArray, third: FloatArray) -> FloatArray:
+    """Sums (n + 1, 3) of what is before each sample of three signals (n,).
 
     They are added in the order of time, so a prefix of the recording has the very same sums.
     """
-    sums = np.empty((values.shape[0] + 1, 3))
+    sums = np.empty((first.shape[0] + 1, 3))
     x = y = z = 0.0
     sums[0, 0] = sums[0, 1] = sums[0, 2] = 0.0
-    for k in range(values.shape[0]):
-        x, y, z = x + values[k, 0], y + values[k, 1], z + values[k, 2]
+    for k in range(first.shape[0]):
+        x, y, z = x + first[k], y + second[k], z + third[k]
         sums[k + 1, 0], sums[k + 1, 1], sums[k + 1, 2] = x, y, z
     return sums
 
@@ -226,16 +226,14 @@ def step_rates(recording: Recording, bias: FloatArray) -> FloatArray:
     ndarray (n, 3)
         rad/s, C-contiguous; row 0 is the first sample itself.
     """
-    gyro = np.ascontiguousarray(recording.imu[list(GYRO)].to_numpy(dtype=np.float64))
-    rates = np.empty_like(gyro)
-    _step_rates(gyro, bias, rates)
+    rates = np.empty((len(recording.imu), 3))
+    for axis, gyro in enumerate(rows_of(recording.imu, GYRO)):
+        _step_rates(gyro, bias, axis, rates)
     return rates
 
 
 @njit_borrowed
-def _step_rates(gyro: FloatArray, bias: FloatArray, rates: FloatArray) -> None:
-    for axis in range(3):
-        rates[0, axis] = gyro[0, axis] - bias[0, axis]
+def _step_rates(gyro: FloatArray, bias: FloatArray, axis: int, rates: FloatArray) -> None:
+    rates[0, axis] = gyro[0] - bias[0, axis]
     for k in range(1, len(gyro)):
-        for axis in range(3):
-            rates[k, axis] = gyro[k, axis] - bias[k, axis] - 0.5 * (gyro[k, axis] - gyro[k - 1, axis])
+        rates[k, axis] = gyro[k] - bias[k, axis] - 0.5 * (gyro[k] - gyro[k - 1])

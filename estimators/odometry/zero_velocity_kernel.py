@@ -205,7 +205,9 @@ def zero_velocity(
         now = _evidence(model, k, x, p, turn, variance)
         more = max(now, odds + model.step_s / TURN_S * now) if now > 0.0 else max(odds, 0.0) + now
         odds = min(more, SUREST)
-        found.log_odds[k] = PRIOR + odds + speed_log_ratio(x[V], p[V, V])
+        # That it shakes no more is said once: a train whose sensors hide it shows so for all of its ride.
+        quiet = max(model.shaking[k], 0.0)
+        found.log_odds[k] = PRIOR + odds + quiet + speed_log_ratio(x[V], p[V, V])
         stood = rests
         rests = found.log_odds[k] > model.surely if model.given[k] < 0.0 else model.given[k] > 0.0
         if stood and not rests:
@@ -259,7 +261,8 @@ def _evidence(
     shared = (slope * p[V, PITCH] - p[V, PUSH]) / p[V, V]
     push -= shared * x[V]
     known -= shared * shared * p[V, V]
-    return rest_log_ratio(model.shaking[k], turn, variance, push, max(known, 0.0) + model.force_variance)
+    loud = min(model.shaking[k], 0.0)
+    return rest_log_ratio(loud, turn, variance, push, max(known, 0.0) + model.force_variance)
 
 
 @njit_borrowed

@@ -40,8 +40,13 @@ STANDS_MPS = 1.0
 LOST_M = 1.0
 """Of the wheel's way, per step in which it slips: it says nothing, and begins anew after that."""
 
-JERK_S = 1.0
-"""Over which the slope of the acceleration is taken."""
+JERK_S, START_JERK_S = 1.0, 0.3
+"""Over which the slope of the acceleration is taken: of the odometry's, and at a start or stop (`STANDS_MPS`)
+of the accelerometer's, which is at once where the odometry is late by half a second. A body that squats turns
+then, and nothing else turns it: what is missed there passes for speed."""
+
+LEAST_JERK_MPS3 = 0.1
+"""Of a train that begins to move; less is a body that passengers rock, where gravity passes for a jerk."""
 
 
 class Steps(NamedTuple):
@@ -195,7 +200,8 @@ def about(course: Course, states: FloatArray) -> Course:
     followed = np.zeros_like(states)
     followed[:, FOLLOWED] = states[:, FOLLOWED]
     speed, dt = states[:, at.V], course.steps.dt
-    around = course.around._replace(states=followed, jerk=_jerk(states[:, at.A], dt), sense=_sense(speed))
+    jerk = _jerk(course.steps, speed, states[:, at.A])
+    around = course.around._replace(states=followed, jerk=jerk, sense=_sense(speed))
     return course._replace(around=around, way=0.5 * dt * (speed + np.concatenate([speed[:1], speed[:-1]])))
 
 
@@ -274,8 +280,15 @@ def _sense(speed: FloatArray) -> FloatArray:
     return np.where((last >= 0) & (speed[np.maximum(last, 0)] < 0.0), -1.0, 1.0)
 
 
-def _jerk(acceleration: FloatArray, dt: float) -> FloatArray:
-    """Backward difference (n,) over a second; no later value enters."""
-    back = max(1, round(JERK_S / dt))
-    longer = np.concatenate([np.repeat(acceleration[:1], back), acceleration])
-    return np.asarray((acceleration - longer[: len(acceleration)]) / (back * dt))
+def _jerk(steps: Steps, speed: FloatArray, acceleration: FloatArray) -> FloatArray:
+    """Slope (n,) of the acceleration; no later value enters."""
+    at_once = _slope(steps.signals[:, len(GYRO)], steps.dt, START_JERK_S)
+    at_once[steps.resting & (np.abs(at_once) < LEAST_JERK_MPS3)] = 0.0
+    return np.where(np.abs(speed) < STANDS_MPS, at_once, _slope(acceleration, steps.dt, JERK_S))
+
+
+def _slope(values: FloatArray, dt: float, over_s: float) -> FloatArray:
+    """Backward difference (n,) over a time."""
+    back = max(1, round(over_s / dt))
+    longer = np.concatenate([np.repeat(values[:1], back), values])
+    return np.asarray((values - longer[: len(values)]) / (back * dt))

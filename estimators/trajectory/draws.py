@@ -61,7 +61,7 @@ def state_errors(model: Model, past: Past, streams: Sequence[np.random.Generator
     model : Model
         What the filter had.
     past : Past
-        What it left behind, before the way back replaces it.
+        What it left behind.
     streams : sequence of numpy.random.Generator
         One for each of m draws.
 

@@ -7,8 +7,7 @@ apart. What happens along the track comes as `TERMS` of each sample, made by
 
 The algebra is that of `simrail.estimators.kalman`; the structure of the model makes it fast: the transition
 is a few chains of integrators, and a row of the Jacobian has few entries (35 of 96). The ways back use what
-the filter left behind; the smoother replaces it, in place: a ride of an hour then needs no second copy of its
-covariances. Random numbers come from outside.
+the filter left behind. Random numbers come from outside.
 
 Not here: the geometry of the rails that follows from a draw (`simrail.estimators.trajectory.draws`).
 """
@@ -20,7 +19,6 @@ from simrail.estimators.kalman import (
     chain,
     chain_back,
     chain_covariance,
-    condition,
     log_density,
     mirror,
     withdraw,
@@ -72,6 +70,10 @@ RATE_COLUMNS = np.array(
 
 ANGLE_COLUMNS = np.array([[PITCH, YAW], [ROLL, YAW], [ROLL, PITCH]])
 """Angles that each row of the accelerometer depends on, besides all of y to z''."""
+
+MIRRORED = 16
+"""Samples after which a covariance is made symmetric anew (`simrail.estimators.kalman.mirror`): what rounding
+leaves grows by a few units in the last place until then, and at every sample it takes a tenth of the time."""
 
 INTO = (ROLL, PITCH, YAW, Y, Y, YD, Z, Z, ZD)
 ORIGIN = (ROLL_RATE, PITCH_RATE, YAW_RATE, YD, YDD, YDD, ZD, ZDD, ZDD)
@@ -271,9 +273,8 @@ def predict(x: FloatArray, p: FloatArray, process: FloatArray, kind: int, dt: fl
     chain_covariance(p, INTO, ORIGIN, share)
     for first, end in BLOCKS:
         for i in range(first, end):
-            for c in range(i, end):
+            for c in range(first, end):
                 p[i, c] += process[kind, i, c]
-    mirror(p)
 
 
 @njit_inline
@@ -310,6 +311,35 @@ def across(p: FloatArray, rows: FloatArray, m: int, dx: FloatArray, v: FloatArra
     return v[a], dx[a]
 
 
+@njit_inline
+def mirror_at(p: FloatArray, k: int) -> None:
+    """`simrail.estimators.kalman.mirror` at every so many samples (`MIRRORED`)."""
+    if k % MIRRORED == 0:
+        mirror(p)
+
+
+@njit_inline
+def less_square(p: FloatArray, v: FloatArray, inverse: float) -> None:
+    """P <- P - v v'/s in place, (12, 16) and (16,); written out as `less_outer`, for the same reason."""
+    g0, g1, g2, g3 = v[0] * inverse, v[1] * inverse, v[2] * inverse, v[3] * inverse
+    g4, g5, g6, g7 = v[4] * inverse, v[5] * inverse, v[6] * inverse, v[7] * inverse
+    g8, g9, g10, g11 = v[8] * inverse, v[9] * inverse, v[10] * inverse, v[11] * inverse
+    for c in range(WIDTH):
+        u = v[c]
+        p[0, c] -= g0 * u
+        p[1, c] -= g1 * u
+        p[2, c] -= g2 * u
+        p[3, c] -= g3 * u
+        p[4, c] -= g4 * u
+        p[5, c] -= g5 * u
+        p[6, c] -= g6 * u
+        p[7, c] -= g7 * u
+        p[8, c] -= g8 * u
+        p[9, c] -= g9 * u
+        p[10, c] -= g10 * u
+        p[11, c] -= g11 * u
+
+
 @njit
 def trajectory_filter(model: Model, past: Past, out: Filtered) -> float:
     """Run the filter; fills ``past`` and ``out``.
@@ -341,6 +371,7 @@ def trajectory_filter(model: Model, past: Past, out: Filtered) -> float:
         kind = kinds[k]
         if k > 0:
             predict(x, p, process, kind, step_s)
+            mirror_at(p, k)
         if before.shape[0] > 0:
             before[k] = x
             pack(p, before_covariance, k)
@@ -354,7 +385,10 @@ def trajectory_filter(model: Model, past: Past, out: Filtered) -> float:
             spread, moved = across(p, rows, m, dx, v)
             error, s = residual[m] - moved, spread + noise[kind, m]
             inverse = 1.0 / s
-            condition(dx, p, v, error, inverse, gain)
+            less_square(p, v, inverse)
+            for i in range(STATES):
+                gain[i] = v[i] * inverse
+                dx[i] += gain[i] * error
             squares += error * error * inverse
             product *= s
             if m == 5:
@@ -394,11 +428,11 @@ def packed_product(packed: FloatArray, k: int, lam: FloatArray, out: FloatArray)
 
 @njit_inline
 def dot(a: FloatArray, b: FloatArray) -> float:
-    """Sum of twelve products, by halves: the processor need not wait for each before the next."""
-    first = (a[0] * b[0] + a[1] * b[1]) + (a[2] * b[2] + a[3] * b[3])
-    second = (a[4] * b[4] + a[5] * b[5]) + (a[6] * b[6] + a[7] * b[7])
-    third = (a[8] * b[8] + a[9] * b[9]) + (a[10] * b[10] + a[11] * b[11])
-    return float(first + second + third)
+    """Sum of twelve products, in parts that need not wait for each other, in the order of `row_times`."""
+    first = a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+    second = a[3] * b[3] + a[4] * b[4] + a[5] * b[5]
+    third = a[6] * b[6] + a[7] * b[7] + a[8] * b[8]
+    return float(first + second + (third + a[9] * b[9] + a[10] * b[10] + a[11] * b[11]))
 
 
 @njit_inline
@@ -444,28 +478,27 @@ def less_outer(info: FloatArray, h: FloatArray, w: FloatArray) -> None:
 
 @njit_inline
 def through_update(
-    lam: FloatArray,
-    info: FloatArray,
-    h: FloatArray,
-    gain: FloatArray,
-    error: float,
-    inverse: float,
-    v: FloatArray,
-    with_covariance: bool,
+    info: FloatArray, h: FloatArray, gain: FloatArray, error: float, inverse: float, v: FloatArray
 ) -> None:
-    """`simrail.estimators.kalman.withdraw`, and `withdraw_information` if wanted, on padded arrays.
+    """`simrail.estimators.kalman.withdraw` and `withdraw_information` at once, on padded arrays.
 
-    Specialised by hand: on those of any shape the information of a sample takes three times as long.
+    The first of the columns that fill up ``info`` is lam, which then costs nothing of its own: h is 0 there.
+    Specialised by hand: on arrays of any shape the information of a sample takes three times as long.
     """
-    total = error + dot(gain, lam)
+    row_times(gain, info, v)
+    half = 0.5 * (inverse + dot(gain, v))
+    for i in range(WIDTH):
+        v[i] -= half * h[i]
+    v[STATES] += error
+    less_outer(info, h, v)
+
+
+@njit_inline
+def withdraw_mean(lam: FloatArray, h: FloatArray, gain: FloatArray, error: float) -> None:
+    """What `through_update` does to lam, to the bit."""
+    total = dot(gain, lam) + error
     for i in range(STATES):
         lam[i] -= h[i] * total
-    if with_covariance:
-        row_times(gain, info, v)
-        half = 0.5 * (inverse + dot(gain, v))
-        for i in range(WIDTH):
-            v[i] -= half * h[i]
-        less_outer(info, h, v)
 
 
 @njit_inline
@@ -486,7 +519,6 @@ def information_back(info: FloatArray, dt: float) -> None:
         info[i, YAW_RATE] += dt * info[i, YAW]
         info[i, YD], info[i, YDD] = yd + dt * y, info[i, YDD] + dt * yd + half * y
         info[i, ZD], info[i, ZDD] = zd + dt * z, info[i, ZDD] + dt * zd + half * z
-    mirror(info)
 
 
 @njit_inline
@@ -503,8 +535,10 @@ def shrink(
 
 
 @njit
-def trajectory_back(model: Model, past: Past, chosen: IntArray, found: FloatArray) -> None:
-    """Turn predicted states into smoothed ones, in place, and say how sure they are.
+def trajectory_back(
+    model: Model, past: Past, chosen: IntArray, smoothed: FloatArray, found: FloatArray
+) -> None:
+    """Smoothed states, and how sure they are.
 
     `simrail.estimators.kalman.fixed_interval` has the equations. The Jacobian is made again, which is cheaper
     than to fetch it.
@@ -515,10 +549,12 @@ def trajectory_back(model: Model, past: Past, chosen: IntArray, found: FloatArra
         What the filter had, and what it left behind.
     chosen : ndarray of int (m,)
         States whose covariance is wanted, in increasing order.
+    smoothed : ndarray (n, 12), out
+        May be the states of ``past``, which are then replaced.
     found : ndarray (n, m (m + 1)/2), out
         Upper triangles of that covariance, row by row; of all twelve it may be that of ``past`` itself.
     """
-    # Named once, before the loop, as in the filter.
+    # Named once, before the loop, as in the filter. Backwards, so that a row may be replaced in place.
     track, slips, gravity, dt = model.track, model.slips, model.gravity, model.step_s
     states, covariance, gains, scaled = past
     lam, v, h, g = np.zeros(WIDTH), np.zeros(WIDTH), np.zeros(WIDTH), np.zeros(ROWS)
@@ -530,16 +566,23 @@ def trajectory_back(model: Model, past: Past, chosen: IntArray, found: FloatArra
         for m in range(ROWS - 1, -1, -1):
             for i in range(WIDTH):
                 h[i] = rows[m, i]
-            error, inverse = scaled[k, m, 0], scaled[k, m, 1]
-            through_update(lam, info, h, gains[k, m], error, inverse, v, with_covariance)
+            if with_covariance:
+                through_update(info, h, gains[k, m], scaled[k, m, 0], scaled[k, m, 1], v)
+            else:
+                withdraw_mean(lam, h, gains[k, m], scaled[k, m, 0])
+        if with_covariance:
+            for i in range(STATES):
+                lam[i] = info[i, STATES]
         unpack(covariance, k, p)
         row_times(lam, p, v)
         for i in range(STATES):
-            states[k, i] -= v[i]
+            smoothed[k, i] = states[k, i] - v[i]
         if with_covariance:
             shrink(info, p, chosen, v, found, k)
             information_back(info, dt)
-        chain_back(lam, INTO, ORIGIN, share)
+            mirror_at(info, k)
+        else:
+            chain_back(lam, INTO, ORIGIN, share)
 
 
 @njit_borrowed

@@ -17,12 +17,13 @@ import numpy as np
 from scipy.linalg import block_diag
 from simrail.estimators.attitude.compensation import design_frame, track_motion
 from simrail.estimators.attitude.rest_bias import rest_bias
-from simrail.estimators.trajectory.kernel import STATES, Model
+from simrail.estimators.trajectory.kernel import STATES, TERMS, Model
+from simrail.estimators.trajectory.model_kernel import beyond, less_bias, terms
 from simrail.estimators.trajectory.noise import Hyperparameters
 
-from simrail.core.columns import ACCEL, GYRO
+from simrail.core.columns import IMU
 from simrail.core.jit import FloatArray, IntArray
-from simrail.recording.recording import Recording, odometry_of
+from simrail.recording.recording import Recording, odometry_of, rows_of
 from simrail.track.design import STRAIGHT, TrackFrame
 
 
@@ -83,12 +84,12 @@ def model_of(
     """
     sheet = recording.imu_sheet
     frame = design_frame(recording)
-    signals = recording.imu[[*GYRO, *ACCEL]].to_numpy(dtype=np.float64, copy=True)
-    signals[:, :3] -= rest_bias(recording, enabled=use_rest_bias).bias
+    signals = np.empty((len(recording.imu), 6))
+    less_bias(rows_of(recording.imu, IMU), rest_bias(recording, enabled=use_rest_bias).bias, signals)
     speed = odometry_of(recording)["speed_mps"].to_numpy(dtype=np.float64)
     if second_order and not printed:
-        angles, rates = np.column_stack([frame.roll_rad, frame.pitch_rad, frame.yaw_rad]), frame.rates
         if around is None:
+            angles, rates = np.array([frame.roll_rad, frame.pitch_rad, frame.yaw_rad]).T, frame.rates
             rates = speed[:, None] * rates
         else:
             angles, rates = around[:, [0, 2, 4]], around[:, [1, 3, 5]]
@@ -99,7 +100,7 @@ def model_of(
     start[[1, 3, 5]] = speed[0] * frame.rates[0]
     start[[6, 9]] = lateral, height
     model = Model(
-        signals=np.ascontiguousarray(signals),
+        signals=signals,
         track=track_terms(recording, frame, printed=printed),
         slips=jacobian_slips(frame, speed) if printed else np.empty((0, 3)),
         kinds=kinds_of(recording),
@@ -115,19 +116,11 @@ def model_of(
 
 
 def track_terms(recording: Recording, frame: TrackFrame, *, printed: bool = False) -> FloatArray:
-    """`simrail.estimators.trajectory.kernel.TERMS` at every sample, (n, 15).
-
-    Printed, the rotation about the vertical takes the place of that about Y where the body's height enters
-    (paper 001, appendix 1, g4C, g5C, g6C).
-    """
+    """`simrail.estimators.trajectory.kernel.TERMS` at every sample, (n, 15)."""
     motion = track_motion(recording, printed=printed)
-    of_z = motion.of_z.copy()
-    if printed:
-        of_z[:, 2] = motion.of_y[:, 1]
-    angles = (frame.roll_rad, frame.pitch_rad, frame.yaw_rad)
-    return np.ascontiguousarray(
-        np.column_stack([*angles, motion.origin, motion.of_y, of_z, 2.0 * motion.rate])
-    )
+    found = np.empty((motion.rows.shape[1], len(TERMS)))
+    terms(frame.roll_rad, frame.pitch_rad, frame.yaw_rad, motion.rows, printed, found)
+    return found
 
 
 def beyond_first_order(angles: FloatArray, rates: FloatArray, gravity: float) -> FloatArray:
@@ -148,18 +141,10 @@ def beyond_first_order(angles: FloatArray, rates: FloatArray, gravity: float) ->
     ndarray (n, 6)
         rad/s and m/s2.
     """
-    roll, pitch, _ = angles.T
-    _, pitch_rate, yaw_rate = rates.T
-    sr, cr, sp, cp = np.sin(roll), np.cos(roll), np.sin(pitch), np.cos(pitch)
-    beyond = [
-        (pitch - sp) * yaw_rate,
-        (cr - 1.0) * pitch_rate + (sr * cp - roll) * yaw_rate,
-        (roll - sr) * pitch_rate + (cr * cp - 1.0) * yaw_rate,
-        gravity * (pitch - sp),
-        gravity * (sr * cp - roll),
-        gravity * (cr * cp - 1.0),
-    ]
-    return np.column_stack(beyond)
+    roll, pitch, pitch_rate, yaw_rate = (np.ascontiguousarray(row) for row in (*angles.T[:2], *rates.T[1:]))
+    found = np.empty((len(angles), 6))
+    beyond(roll, pitch, pitch_rate, yaw_rate, gravity, found)
+    return found
 
 
 def jacobian_slips(frame: TrackFrame, speed: FloatArray) -> FloatArray:

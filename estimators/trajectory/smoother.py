@@ -20,6 +20,7 @@ The model stands in `simrail.estimators.trajectory.model`, the noise in `simrail
 """
 
 import math
+import threading
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
@@ -32,6 +33,7 @@ from simrail.estimators.trajectory.kernel import (
     PACKED,
     STATES,
     Model,
+    Past,
     outputs,
     room_for_filtered,
     room_for_past,
@@ -300,6 +302,30 @@ class TrajectorySmoother:
         )
 
 
+class _Rooms(threading.local):
+    """Room for what a filter leaves behind, of one thread, kept from one run to the next.
+
+    It is 1.6 kB a sample. The system clears what it hands out, page by page, which took a seventh of an
+    estimate; of a long ride the room is given back all the same.
+    """
+
+    most = 80_000
+    """Samples of the longest ride whose room is kept: 130 MB, five minutes at 250 Hz."""
+
+    kept: Past | None = None
+
+    def past(self, n: int) -> Past:
+        """Room for n samples; what the run before left there is lost."""
+        if n > self.most:
+            return room_for_past(n)
+        if self.kept is None or len(self.kept.states) < n:
+            self.kept = room_for_past(n)
+        return Past(*(array[:n] for array in self.kept))
+
+
+_ROOMS = _Rooms()
+
+
 def packed_at(states: tuple[int, ...]) -> IntArray:
     """Columns of an upper triangle of all twelve, row by row, that hold the one of some of them, in order."""
     rows, columns = (np.array(states, dtype=np.int64)[i] for i in np.triu_indices(len(states)))
@@ -330,16 +356,19 @@ def run_model(
     ``covariance_of`` are the states whose covariance is wanted, in increasing order: fewer take less time.
     """
     n = len(model.signals)
-    past = room_for_past(n if smoothed else 0)
+    is_kept = n <= _ROOMS.most
+    past = _ROOMS.past(n) if smoothed else room_for_past(0)
     out = room_for_filtered(states=0 if smoothed else n, innovations=n)
     likelihood, errors = trajectory_filter(model, past, out), None
     if smoothed and streams:
         errors = state_errors(model, past, streams)
     at = packed_at(covariance_of)
     if smoothed:
-        covariance = past.covariance if len(at) == PACKED else np.empty((n, len(at)))
-        trajectory_back(model, past, np.array(covariance_of, dtype=np.int64), covariance)
-        states = past.states
+        # What is not kept is replaced in place: a ride of an hour needs no second copy of its covariances.
+        states = np.empty((n, STATES)) if is_kept else past.states
+        is_whole = len(at) == PACKED and not is_kept
+        covariance = past.covariance if is_whole else np.empty((n, len(at)))
+        trajectory_back(model, past, np.array(covariance_of, dtype=np.int64), states, covariance)
     else:
         states, covariance = out.states, out.covariance[:, at] if len(at) < PACKED else out.covariance
     return Trajectory(states, covariance if len(at) else covariance[:0], out.innovations, likelihood, errors)

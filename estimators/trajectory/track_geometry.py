@@ -17,7 +17,14 @@ import numpy as np
 import pandas as pd
 from scipy import ndimage, signal
 from scipy.interpolate import CubicSpline
-from simrail.estimators.trajectory.geometry_kernel import means_of_cells, rails_seen, thinned, variances
+from simrail.estimators.trajectory.geometry_kernel import (
+    means_of_cells,
+    on_spline,
+    rails_seen,
+    spline_slopes,
+    thinned,
+    variances,
+)
 
 from simrail.core.columns import ATTITUDE, IRREGULARITY, IRREGULARITY_SD, RELATIVE_POSITION, require
 from simrail.core.errors import InputError
@@ -177,9 +184,11 @@ def geometry_of(sight: Sight, *, step_m: float) -> pd.DataFrame:
 
 def irregularities(rails: FloatArray) -> FloatArray:
     """The four of `simrail.core.columns.IRREGULARITY` (n, 4) from deviations (n, left and right, y and z)."""
-    left, right = rails[:, 0], rails[:, 1]
-    mean, apart = 0.5 * (left + right), left - right
-    return np.column_stack([mean[:, 0], mean[:, 1], apart[:, 1], apart[:, 0]])
+    left, right, found = rails[:, 0], rails[:, 1], np.empty((len(rails), 4))
+    found[:, :2] = 0.5 * (left + right)
+    found[:, 2] = left[:, 1] - right[:, 1]
+    found[:, 3] = left[:, 0] - right[:, 0]
+    return found
 
 
 def _seen(recording: Recording, base_m: float) -> FloatArray:
@@ -212,7 +221,11 @@ def _covariance(estimate: Estimate) -> FloatArray | None:
     names = ("roll_rad", *RELATIVE_POSITION)
     if estimate.covariance is not None and set(names) <= set(estimate.covariance_of):
         at = [estimate.covariance_of.index(name) for name in names]
-        return np.ascontiguousarray(estimate.covariance[:, at][:, :, at])
+        of_three = np.empty((len(estimate.covariance), 3, 3))
+        for i, row in enumerate(at):
+            for j, column in enumerate(at):
+                of_three[:, i, j] = estimate.covariance[:, row, column]
+        return of_three
     sds = ("roll_sd_rad", "lateral_sd_m", "vertical_sd_m")
     if not set(sds) <= set(estimate.states.columns):
         return None
@@ -299,10 +312,10 @@ def over_space(
         means_of_cells(kinds, columns, count, found)
         return found
 
-    at = mean(place[:, None])[:, 0]
+    at = np.ascontiguousarray(mean(place[:, None])[:, 0])
     position = np.arange(first, last + 1) * step_m
     fine = first * step_m + cell_m * np.arange((len(position) - 1) * FINE + 1)
-    line = CubicSpline(at, mean(values))(np.clip(fine, at[0], at[-1]))
+    line = _spline(at, mean(values), fine)
     line = _thinned(line, _LOW_PASS, odd=True)
     density = count * cell_m / np.gradient(at)  # samples per cell; below one where the train is fast
     spread = np.interp(fine, at, 1.0 / density)[:, None]
@@ -311,6 +324,16 @@ def over_space(
         means = mean(variance)
         variance = np.stack([np.interp(position, at, column) for column in means.T], axis=-1)
     return OverSpace(position, line, variance, np.minimum(gain, 1.0))
+
+
+def _spline(at: FloatArray, values: FloatArray, places: FloatArray) -> FloatArray:
+    """Cubic spline through values (c, m) at places (n,) that do not decrease; beyond its ends it stays."""
+    if len(at) < 4:
+        return np.asarray(CubicSpline(at, values)(np.clip(places, at[0], at[-1])))
+    slopes, found = np.empty_like(values), np.empty((len(places), values.shape[1]))
+    spline_slopes(at, values, np.empty(len(at)), slopes)
+    on_spline(at, values, slopes, places, found)
+    return found
 
 
 def _thinned(line: FloatArray, taps: FloatArray, *, odd: bool) -> FloatArray:

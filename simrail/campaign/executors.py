@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import logging
 import os
+import queue
 import signal
 import threading
 import time
@@ -177,19 +178,23 @@ class _Processes(Executor):
         processes = dict(self._pool._processes or {})
         dead = frozenset(pid for pid, process in processes.items() if not process.is_alive())
         waited_for, self._dead = dead & self._dead, dead
-        queue = self._pool._result_queue
-        if not waited_for or queue is None:
+        results = self._pool._result_queue
+        if not waited_for or results is None:
             return
         for pid in processes.keys() - dead:
             with suppress(ProcessLookupError):
                 os.kill(pid, signal.SIGKILL)
-        queue._writer.close()
+        results._writer.close()
 
     def renew(self) -> None:
-        self._pool.shutdown(wait=True, kill_workers=True)
+        self.close()
         self._pool, self._dead = self._new(), frozenset()
 
     def close(self) -> None:
+        # The pool's thread forgets what it has not begun, then looks it up: a KeyError on the terminal.
+        with suppress(queue.Empty):
+            while True:
+                self._pool._work_ids.get_nowait()
         self._pool.shutdown(wait=True, kill_workers=True)
 
 

@@ -18,7 +18,7 @@ from simrail.report.tables.pivot import Case
 from simrail.report.words.ablations import WORDS
 from simrail.scoring.ablations import ABLATIONS, Ablation
 
-MOST_GROUPS = 4
+MOST_GROUPS = 1
 """Mounts, IMUs and odometries whose comparison is printed; the page has all."""
 
 _SHORT = {"drawn": "errs", "both ways": "both", "all speeds": "all", "forward": "forth", "backward": "back"}
@@ -59,7 +59,8 @@ def _print_cost(
             heads = [words.replace("\u00b9", " less\nits start") for _, words in ATTITUDE]
             console.print(_comparison(angles, attitude, heads, words.short))
     if groups:
-        more = f"; {len(groups) - MOST_GROUPS} more are in the report" * (len(groups) > MOST_GROUPS)
+        left = len(groups) - MOST_GROUPS
+        more = f"; {left} more {'is' if left == 1 else 'are'} in the report" * (left > 0)
         console.print(Text(f"{words.note}; * baseline{more}", style="dim"))
 
 

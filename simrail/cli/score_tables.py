@@ -1,5 +1,10 @@
-"""The scores as the command line shows them at the end of a run: tables of each case, and notes."""
+"""The scores as the command line shows them at the end of a run: tables, and notes.
 
+A few cases have a table each. Of many, those of one vehicle, IMU and odometry share one, which has the least
+and the most of their means: an average over unlike rides would say nothing.
+"""
+
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import pandas as pd
@@ -22,7 +27,7 @@ from simrail.report.tables.geometry import (
     waves_words,
 )
 from simrail.report.tables.methods import MethodStyle, attitude_methods, method_styles
-from simrail.report.tables.pivot import Case, Mean, cases
+from simrail.report.tables.pivot import CASE_COLUMNS, Case, cases
 from simrail.report.tables.running import decay_words, running_words
 from simrail.report.words.ablations import state_words
 from simrail.results import Results
@@ -46,11 +51,15 @@ RAILS = (*JUDGED, "gauge")
 WIDEST = 80
 """Characters of a line that a table keeps to, however wide the terminal is."""
 
-MOST_GROUPS = 12
+MOST_TABLES = 4
+"""Cases that have a table each, and tables of more."""
+
+MOST_NAMES = 3
+"""Rides of a shared table that are told by name."""
 
 
 def print_scores(console: Console, results: Results) -> None:
-    """Print the tables of every case, ride by ride and IMU by IMU: means over all draws."""
+    """Print means over all draws: of each case where they are few, else what those of an IMU lie between."""
     campaign = results.campaign
     scores, cells = campaign.scores, campaign.cells
     styles = list(method_styles(results.scenario).values())
@@ -65,12 +74,13 @@ def print_scores(console: Console, results: Results) -> None:
     verdicts = campaign.verdicts
     shown = shown[:0] if alone or len(verdicts) else shown
     print_verdicts(console, verdicts, styles)
-    for number, (_, members) in enumerate(shown.groupby("case", sort=True)):
-        if number == MOST_GROUPS:
-            console.print(f"... and {shown['case'].nunique() - number} more cases: see scores.csv")
-            break
+    tables, vehicles = _members(shown), shown["vehicle"].nunique()
+    for members in tables[:MOST_TABLES]:
         rows = scores[scores["cell"].isin(members["cell"])]
-        console.print(_case(console, rows, members, styles, bands, limit))
+        parts = _cases(console, rows, members, styles, bands, limit)
+        console.print(Group(Text(_title(members, with_vehicle=vehicles > 1), style="bold"), *parts))
+    if len(tables) > MOST_TABLES:
+        console.print(f"... and {len(tables) - MOST_TABLES} more tables: see the report, or scores.csv")
     if len(shown) and any(has_both(cells, one) for one in ABLATIONS):
         print_costs(console, cases(scores, cells), styles)
     print_odometries(console, odometries, by_class=alone)
@@ -112,81 +122,109 @@ def print_warnings(console: Console, campaign: CampaignResult) -> None:
         console.print(f"[yellow]warning:[/yellow] {warning}", highlight=False, soft_wrap=True)
 
 
-def _way(first: pd.Series) -> str:
-    """Speed and direction of a ride, or how many passes there are."""
-    if "passes" not in first:
-        return f"{first['speed_kmh']:g} km/h {first['direction']}"
-    return f"{first['passes']} passes" if first["passes"] > 1 else "one pass"
+def _members(cell_table: pd.DataFrame) -> list[pd.DataFrame]:
+    """Cells of each table: of a case, or where these are many of all that share vehicle, IMU and odometry."""
+    few = cell_table["case"].nunique() <= MOST_TABLES
+    shared = ["case"] if few else [name for name in CASE_COLUMNS if name != "ride"]
+    return [members for _, members in cell_table.groupby(shared, sort=few, observed=True, dropna=False)]
 
 
-def _case(
+def _title(members: pd.DataFrame, *, with_vehicle: bool) -> str:
+    """Which rides, on which mount, and what the train knows."""
+    first = members.iloc[0]
+    rides = list(dict.fromkeys(members["ride"]))
+    more = f" and {len(rides) - MOST_NAMES} more" if len(rides) > MOST_NAMES else ""
+    mount = f"{first['mount']} of {first['vehicle']}" if with_vehicle else first["mount"]
+    return (
+        f"{', '.join(rides[:MOST_NAMES])}{more}: {_way(members)}, {first['imu']} on {mount}, "
+        f"odometry: {first['odometry']}, {state_words(first.to_dict(), comma=', ')}"
+    )
+
+
+def _way(members: pd.DataFrame) -> str:
+    """Speed and direction, or how many passes there are."""
+    if "passes" in members:
+        passes = sorted(set(members["passes"]))
+        many = f"{'' if len(passes) == 1 else f'{passes[0]} to '}{passes[-1]} passes"
+        return many if passes[-1] > 1 else "one pass"
+    least, most = f"{members['speed_kmh'].min():.3g}", f"{members['speed_kmh'].max():.3g}"
+    directions = list(dict.fromkeys(members["direction"]))
+    speed = least if least == most else f"{least} to {most}"
+    return f"{speed} km/h {directions[0] if len(directions) == 1 else 'both ways'}"
+
+
+def _cases(
     console: Console,
     rows: pd.DataFrame,
     members: pd.DataFrame,
     styles: list[MethodStyle],
     bands: dict[str, Band],
     derailment_limit: float,
-) -> Group:
-    """Title, the ride itself and rails where they are scored, attitude, and notes.
-
-    Title and notes may be wider than a table.
-    """
-    first = members.iloc[0]
-    draws = f"mean of {len(members)} draws" if len(members) > 1 else "one draw"
-    title = Text(
-        f"{first['ride']}: {_way(first)}, "
-        f"{first['imu']} on {first['mount']}, odometry: {first['odometry']}, "
-        f"{state_words(first.to_dict(), comma=', ')}",
-        style="bold",
-    )
+) -> list[RenderableType]:
+    """The ride itself and rails where they are scored, attitude, and notes, which may be wider."""
+    parts: list[RenderableType] = []
     wanted = rows["metric"].isin(("rms", "sd", "us_per_sample")) | (rows["estimator"] == RIDE)
-    shown = rows[(rows["status"] == OK) & wanted]
-    of_cases = cases(shown, members)
-    if not of_cases:
-        return Group(title)
-    case = of_cases[0]
+    every = cases(rows[(rows["status"] == OK) & wanted], members)
+    if not every:
+        return parts
+    alone = every[0] if len(every) == 1 else None
+    each = len(members) // len(every)
+    draws = f"mean of {each} draws" if each > 1 else "one draw"
+    what = draws if alone else f"least and most of {len(every)} kinds of ride, {draws}"
     notes: list[str] = []
-    parts: list[RenderableType] = [title]
-    ride = running_words(case, derailment_limit=derailment_limit)
+    ride = running_words(alone, derailment_limit=derailment_limit) if alone else ""
     if ride:
         parts.append(Text(f"The ride itself: {ride}"))
-    mapping = [style for style in styles if case.get(style.name, JUDGED[0], "sd").draws]
+    mapping = [s for s in styles if any(case.get(s.name, JUDGED[0], "sd").draws for case in every)]
     if mapping:
-        band = judged_band(case)
-        heading = f"Rails: sd of the error {waves_words(band, bands)}, mm; {draws}"
-        parts += [Text(heading), _rails(console, case, mapping, band)]
-        notes += _lost_rails(case, mapping, band)
-    attitude = [s for s in attitude_methods(styles) if case.get(s.name, "roll", "rms").draws]
+        band = judged_band(every[0])
+        parts.append(Text(f"Rails: sd of the error {waves_words(band, bands)}, mm; {what}"))
+        parts.append(_rails(console, every, mapping, band))
+        notes += _lost_rails(alone, mapping, band) if alone else []
+    attitude = [
+        s for s in attitude_methods(styles) if any(case.get(s.name, "roll", "rms").draws for case in every)
+    ]
     if attitude:
-        parts += [
-            Text(f"Attitude: rms error, deg; {draws}"),
-            _attitude(console, case, attitude, bool(mapping)),
-        ]
-        notes += _lost_attitude(case, attitude)
-    astray = case.get(f"odometry:{first['odometry']}", "position", "rms")
-    if astray.draws and first["odometry"] != "truth":
-        notes.insert(0, f"the odometry's position error is {astray.value:.3g} m rms")
-    if any(style.baseline for style in (*mapping, *attitude)):
-        notes.insert(0, "* baseline")
-    parts.append(Text("; ".join(notes), style="dim"))
-    return Group(*parts)
+        parts.append(Text(f"Attitude: rms error, deg; {what}"))
+        parts.append(_attitude(console, every, attitude, bool(mapping)))
+        notes += _lost_attitude(alone, attitude) if alone else []
+    notes = [*_baselines([*mapping, *attitude]), *_astray(every), *notes]
+    return [*parts, Text("; ".join(notes), style="dim")]
 
 
-def _rails(console: Console, case: Case, styles: list[MethodStyle], band: str) -> Table:
+def _baselines(styles: list[MethodStyle]) -> list[str]:
+    return ["* baseline"] if any(style.baseline for style in styles) else []
+
+
+def _astray(every: Sequence[Case]) -> list[str]:
+    """By how much the odometry is off, unless it is the truth."""
+    name = every[0].labels["odometry"]
+    astray = [case.get(f"odometry:{name}", "position", "rms") for case in every]
+    known = [mean.value for mean in astray if mean.draws]
+    if not known or name == "truth":
+        return []
+    least, most = f"{min(known):.3g}", f"{max(known):.3g}"
+    return [f"the odometry's position error is {least if least == most else f'{least} to {most}'} m rms"]
+
+
+def _rails(console: Console, every: Sequence[Case], styles: list[MethodStyle], band: str) -> Table:
     """Standard deviations of the errors of those methods that say what the rails look like."""
     heads = {q: QUANTITIES[q].replace(" ", "\n").replace("cross-", "cross-\n") for q in RAILS}
     columns = [_Column(head, q, "sd", {"band": band}) for q, head in heads.items()]
-    return _table(console, case, styles, columns, timed=True)
+    return _table(console, every, styles, columns, timed=len(every) == 1)
 
 
-def _attitude(console: Console, case: Case, styles: list[MethodStyle], beside_rails: bool) -> Table:
+def _attitude(
+    console: Console, every: Sequence[Case], styles: list[MethodStyle], beside_rails: bool
+) -> Table:
     """Rms errors of the attitude; the time is told once, with the rails where there are any."""
     columns = []
     for quantity, reference, window in ATTITUDE:
-        if not (beside_rails and reference == "design"):
+        # Against the design nothing is told beside rails, nor where each figure is two.
+        if reference == "truth" or (len(every) == 1 and not beside_rails):
             head = f"{quantity}\n{window}" + ("\nvs\ndesign" if reference == "design" else "")
             columns.append(_Column(head, quantity, "rms", {"window": window, "reference": reference}))
-    return _table(console, case, styles, columns, timed=not beside_rails)
+    return _table(console, every, styles, columns, timed=len(every) == 1 and not beside_rails)
 
 
 class _Column(NamedTuple):
@@ -197,28 +235,30 @@ class _Column(NamedTuple):
     metric: str
     where: dict[str, str]
 
-    def mean(self, case: Case, style: MethodStyle) -> Mean:
-        """Mean of a method over the draws of a case."""
-        return case.get(style.name, self.quantity, self.metric, **self.where)
+    def words(self, every: Sequence[Case], style: MethodStyle, *, digits: int = 3) -> str:
+        """Mean of a method over the draws of a case, or what those of several lie between; "-" for none."""
+        means = [case.get(style.name, self.quantity, self.metric, **self.where) for case in every]
+        values = [mean.value for mean in means if mean.draws]
+        words = [f"{value:.{digits}f}" for value in ((min(values), max(values)) if values else ())]
+        return "\u2013".join(dict.fromkeys(words)) or "-"
 
 
 def _table(
-    console: Console, case: Case, styles: list[MethodStyle], columns: list[_Column], *, timed: bool
+    console: Console, every: Sequence[Case], styles: list[MethodStyle], columns: list[_Column], *, timed: bool
 ) -> Table:
     """Method, figures that some method has, and time per sample; long names are folded, never cut."""
     table = Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
     table.add_column("method", overflow="fold")
     # A ride without curves has no columns of them.
-    filled = [column for column in columns if any(column.mean(case, style).draws for style in styles)]
+    filled = [c for c in columns if any(c.words(every, style) != "-" for style in styles)]
     for head in [*(column.head for column in filled), *(["us per\nsample"] if timed else [])]:
         table.add_column(head, justify="right", no_wrap=True)
+    time = _Column("", "roll", "us_per_sample", {})
     for style in styles:
-        means = [column.mean(case, style) for column in filled]
-        time = case.get(style.name, "roll", "us_per_sample")
         table.add_row(
             f"{style.name}{' *' if style.baseline else ' (ablation)' if style.ablation else ''}",
-            *(f"{mean.value:.3f}" if mean.draws else "-" for mean in means),
-            *([f"{time.value:.2f}" if time.draws else "-"] if timed else []),
+            *(column.words(every, style) for column in filled),
+            *([time.words(every, style, digits=2)] if timed else []),
             style="dim" if style.baseline else None,
         )
     if Measurement.get(console, console.options, table).maximum > WIDEST:

@@ -14,11 +14,14 @@ This module neither simulates nor estimates.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
+import numpy as np
 import pandas as pd
 
 from simrail.core.errors import InputError
+from simrail.core.jit import FloatArray
 from simrail.core.shown import Facts, Shown, names
 from simrail.recording.sheets.vehicle_sheet import VehicleSheet
 from simrail.track.design import TrackDesign
@@ -359,6 +362,18 @@ class Recording(Shown):
     def with_odometry(self, odometry: pd.DataFrame, source: str) -> Recording:
         """Return the same recording with another odometry frame."""
         return replace(self, odometry=odometry, odometry_source=source)
+
+
+def rows_of(frame: pd.DataFrame, columns: Iterable[str]) -> tuple[FloatArray, ...]:
+    """Columns of a frame for a kernel, (n,) each, contiguous; not copied where the frame holds them so.
+
+    All are read-only: of arrays that are not a kernel would be compiled once more.
+    """
+    values = frame.to_numpy(dtype=np.float64)
+    rows = [np.ascontiguousarray(values[:, frame.columns.get_loc(name)]) for name in columns]
+    for row in rows:
+        row.flags.writeable = False
+    return tuple(rows)
 
 
 def odometry_of(recording: Recording) -> pd.DataFrame:

@@ -58,7 +58,7 @@ def motion_times(recording: Recording) -> FloatArray:
     if recording.encoder is not None:
         turned = np.zeros(len(recording.encoder), dtype=np.bool_)
         _moves(recording.encoder["pulse_count"].to_numpy(dtype=np.float64), turned)
-        return _times(recording.encoder[turned])
+        return _times(recording.encoder)[turned]
     way = recording.odometer if recording.odometry is None else recording.odometry
     if way is None:
         return _times(recording.imu)

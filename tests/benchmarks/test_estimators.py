@@ -168,7 +168,7 @@ def test_ekf_kernel(benchmark: Callable) -> None:
         ratio_to_vqf=vqf_us(),
         ratio_to_imufusion=imufusion_us(),
     )
-    assert us <= 0.15
+    assert us <= 0.08
     assert benchmark.extra_info["ratio_to_filterpy"] >= 250.0
 
 
@@ -253,7 +253,10 @@ def test_gda_beside_ahrs_madgwick(benchmark: Callable) -> None:
 
 @pytest.mark.parametrize("estimator", [AttitudeEkf(), AttitudeGda()], ids=["ekf", "gda"])
 def test_whole_estimate(benchmark: Callable, estimator: AttitudeEkf | AttitudeGda) -> None:
-    report(benchmark, lambda: estimator.estimate(ride()), len(ride().imu), ratio_to_filterpy=filterpy_us())
+    us = report(
+        benchmark, lambda: estimator.estimate(ride()), len(ride().imu), ratio_to_filterpy=filterpy_us()
+    )
+    assert us <= 0.15
 
 
 @pytest.mark.parametrize("estimator", [AttitudeEkf(), AttitudeGda()], ids=["ekf", "gda"])
@@ -262,7 +265,8 @@ def test_sixteen_draws_as_lanes(benchmark: Callable, estimator: AttitudeEkf | At
     recordings = [ride(draw) for draw in range(16)]
     samples = sum(len(one.imu) for one in recordings)
     alone = best_us(lambda: [estimator.estimate(one) for one in recordings], samples)
-    # The loop itself is a quarter of an estimate: the whole gains a tenth. No limit, a figure to be watched.
+    # The loop itself is a third of an estimate, and what lanes need besides takes most of what they gain: no
+    # limit, a figure to be watched.
     report(benchmark, lambda: estimator.estimate_many(recordings), samples, ratio_to_alone=alone)
 
 
@@ -282,7 +286,8 @@ def run_trajectory(model: Model, *, with_covariance: bool) -> Callable[[], None]
 
     def run() -> None:
         trajectory_filter(model, past, out)
-        trajectory_back(model, past, np.arange(STATES if with_covariance else 0), past.covariance)
+        chosen = np.arange(STATES if with_covariance else 0)
+        trajectory_back(model, past, chosen, past.states, past.covariance)
 
     return run
 
@@ -325,12 +330,13 @@ def test_trajectory_smoother_with_covariances(benchmark: Callable) -> None:
 
 def test_trajectory_whole_estimate(benchmark: Callable) -> None:
     smoother = TrajectorySmoother()
-    report(
+    us = report(
         benchmark,
         lambda: smoother.estimate(ride()),
         len(ride().imu),
         ratio_to_filterpy=trajectory_filterpy_us(True),
     )
+    assert us <= 2.0
 
 
 def test_trajectory_time_is_linear_in_the_ride() -> None:

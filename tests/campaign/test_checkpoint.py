@@ -22,7 +22,9 @@ import simrail
 from simrail import results
 from simrail.campaign import checkpoint
 from simrail.campaign.campaign import key_of, run_campaign
+from simrail.campaign.cell import Failure
 from simrail.campaign.checkpoint import Checkpoint, Start, checkpoint_of
+from simrail.campaign.worker import BatchResult
 from simrail.cli.main import BAD_INPUT, CELL_FAILED, DONE, call
 from simrail.core import source_hash
 from simrail.core.errors import InputError
@@ -30,8 +32,6 @@ from simrail.ride.ride import simulate
 from simrail.scenario.cells import cells
 from simrail.scenario.check import judge_scenario
 from simrail.scenario.scenario import Scenario, load_scenario
-
-pytestmark = pytest.mark.long
 
 Same = Callable[[pd.DataFrame, pd.DataFrame], None]
 
@@ -52,6 +52,7 @@ def hidden(folder: Path) -> list[Path]:
     return sorted((folder / "results").glob(".*"))
 
 
+@pytest.mark.long
 def test_batches_come_back_as_they_were(rides: Path, short: Callable[..., Scenario], tmp_path: Path) -> None:
     kept = Checkpoint(tmp_path / "kept")
     assert kept.is_empty and kept.cells() == set()
@@ -64,6 +65,7 @@ def test_batches_come_back_as_they_were(rides: Path, short: Callable[..., Scenar
     assert kept.cells() == {0, 1, 2} and kept.damaged == 0
 
 
+@pytest.mark.long
 def test_a_batch_that_cannot_be_written_leaves_nothing(
     rides: Path, short: Callable[..., Scenario], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -81,6 +83,7 @@ def test_a_batch_that_cannot_be_written_leaves_nothing(
     assert list(other.folder.iterdir()) == []
 
 
+@pytest.mark.long
 def test_damaged_batches_are_dropped_and_run_again(
     mine: list[str], here: Path, capsys: pytest.CaptureFixture[str], whole: pd.DataFrame, assert_same: Same
 ) -> None:
@@ -103,6 +106,7 @@ def test_damaged_batches_are_dropped_and_run_again(
     assert hidden(here) == []
 
 
+@pytest.mark.long
 def test_a_damaged_ride_and_one_that_is_gone_are_simulated_again(
     mine: list[str],
     here: Path,
@@ -126,6 +130,7 @@ def test_a_damaged_ride_and_one_that_is_gone_are_simulated_again(
     assert_same(whole, pd.read_parquet(here / "results" / "mine" / "scores.parquet"))
 
 
+@pytest.mark.long
 def test_a_full_disk_ends_in_one_line_and_the_next_run_goes_on(
     mine: list[str],
     here: Path,
@@ -152,6 +157,7 @@ def test_a_full_disk_ends_in_one_line_and_the_next_run_goes_on(
     assert hidden(here) == []
 
 
+@pytest.mark.long
 def test_a_disk_that_is_really_full(
     noting_file: Path, tmp_path: Path, no_drawing: None, capsys: pytest.CaptureFixture[str], here: Path
 ) -> None:
@@ -179,6 +185,7 @@ def test_a_disk_that_is_really_full(
         subprocess.run(["umount", str(small)], check=True)
 
 
+@pytest.mark.long
 def test_fresh_and_resume(mine: list[str], here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert call([*mine, "--resume"]) == BAD_INPUT
     said = capsys.readouterr().err
@@ -195,6 +202,7 @@ def test_fresh_and_resume(mine: list[str], here: Path, capsys: pytest.CaptureFix
     assert "8 cells to run" in log and "going on" not in log
 
 
+@pytest.mark.long
 def test_another_plan_or_other_code_is_not_gone_on_with(
     mine: list[str], here: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -212,6 +220,7 @@ def test_another_plan_or_other_code_is_not_gone_on_with(
             assert key_of(plan) not in (key, with_other_file)
 
 
+@pytest.mark.long
 def test_code_that_is_left_out_of_the_key_is_there_and_makes_no_score() -> None:
     """A batch imports none of it; a new command or page must not abandon a run that is under way."""
     left_out = source_hash.NO_MATTER
@@ -285,6 +294,7 @@ def test_runs_that_nobody_goes_on_with_are_dropped_after_a_month(tmp_path: Path)
         assert not old.exists() and young.exists()
 
 
+@pytest.mark.long
 def test_retry_failed_runs_exactly_the_failed_cells(
     mine: list[str], here: Path, capsys: pytest.CaptureFixture[str], whole: pd.DataFrame, assert_same: Same
 ) -> None:
@@ -311,6 +321,7 @@ def test_retry_failed_runs_exactly_the_failed_cells(
     assert (folder / "report.html").exists() and hidden(here) == []
 
 
+@pytest.mark.long
 def test_a_cell_alone_is_printed_and_written(
     mine: list[str], here: Path, capsys: pytest.CaptureFixture[str], whole: pd.DataFrame
 ) -> None:
@@ -338,3 +349,49 @@ def test_the_hidden_name_is_what_keeps_a_half_batch_out(tmp_path: Path) -> None:
     assert kept.is_empty
     assert Checkpoint(tmp_path / "kept").is_empty and list(kept.folder.iterdir()) == []
     assert checkpoint.LOG == "run.log"
+
+
+def made(*numbers: int) -> BatchResult:
+    """A batch of cells, with a failure of the first."""
+    return BatchResult(
+        cells=numbers,
+        ride_number=min(numbers) // 4,
+        scores=pd.DataFrame({"cell": numbers, "value": [0.1 * n for n in numbers], "metric": "rms"}),
+        failures=(Failure(numbers[0], "mine", "a reason", "a trace"),),
+        ride={"from_cache": True, "wall_s": 1.5},
+        wall_s={"simulate": 1.0},
+        cpu_s={"simulate": 0.1 + 0.2},
+        notes=("a note",),
+        worker="here",
+    )
+
+
+def test_what_is_kept_comes_back_in_order_and_what_is_damaged_is_counted(tmp_path: Path) -> None:
+    kept = Checkpoint(tmp_path / "kept")
+    batches = [
+        made(8, 9),
+        made(0, 1),
+        made(4, 5, 6),
+        made(
+            12,
+        ),
+    ]
+    for batch in batches:
+        kept.add(batch)
+    back = list(kept.results())
+    assert [batch.cells for batch in back] == [(0, 1), (4, 5, 6), (8, 9), (12,)]
+    for batch, given in zip(back, sorted(batches, key=lambda one: one.cells), strict=True):
+        pd.testing.assert_frame_equal(batch.scores, given.scores, check_exact=True)
+        assert {**vars(batch), "scores": 0} == {**vars(given), "scores": 0}
+    assert kept.cells() == {0, 1, 4, 5, 6, 8, 9, 12} and kept.damaged == 0
+    files = sorted(kept.folder.glob("*.parquet"))
+    for file in (files[0], files[2]):
+        content = bytearray(file.read_bytes())
+        content[len(content) // 2] ^= 1
+        file.write_bytes(content)
+    again = Checkpoint(kept.folder)
+    assert again.cells() == {4, 5, 6, 12} and again.damaged == 2
+    assert sorted(kept.folder.glob("*.parquet")) == [files[1], files[3]]
+    assert again.cells() == {4, 5, 6, 12} and again.damaged == 2
+    again.clear()
+    assert again.is_empty and again.cells() == set()

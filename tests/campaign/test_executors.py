@@ -286,3 +286,14 @@ def test_a_pool_that_waits_for_a_dead_worker_is_broken_and_renewed() -> None:
         executor.renew()
         executor.look_after()
         assert executor.submit(os.getpid).result()
+
+
+def test_work_that_is_not_begun_is_dropped_without_a_word(monkeypatch: pytest.MonkeyPatch) -> None:
+    """More than workers and their queue hold; the pool's own thread must not fall over what is left."""
+    fallen: list[threading.ExceptHookArgs] = []
+    monkeypatch.setattr(threading, "excepthook", fallen.append)
+    with executor_of(2, None, cells=FEW_CELLS + 1) as executor:
+        assert executor.submit(os.getpid).result()
+        handed_in = [executor.submit(time.sleep, 60.0) for _ in range(20)]
+    assert not fallen
+    assert all(future.done() for future in handed_in)

@@ -16,6 +16,7 @@ from simrail.campaign.sensitivity import (
     INDEX_COLUMNS,
     FigureName,
     Sensitivity,
+    _responses,
     indices_of,
     sensitivities,
     sensitivity_table,
@@ -486,3 +487,22 @@ def test_the_most_influential_is_first_by_the_total_effect_or_the_mean_size(meth
     shares, values = np.zeros((0, 3)), np.zeros(0)
     found = Sensitivity("", "ekf", FigureName(), "deg", method, table, shares, values, 2, 0)
     assert found.order == ["c", "a", "b"]
+
+
+def test_a_sample_counts_by_all_of_its_draws_or_not_at_all(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The mean of its draws; where one has no value, or no row, it has none, and the reason is told."""
+    monkeypatch.setattr("simrail.campaign.sensitivity.sample_count", lambda _: 4)
+    cells = pd.DataFrame({"cell": range(8), "sample": [0, 0, 1, 1, 2, 2, 3, 3]})
+    rows = pd.DataFrame(
+        {
+            "cell": [7, 0, 1, 2, 3, 4, 6],
+            "value": [5.0, 1.0, 3.0, 9.0, np.nan, 9.0, 6.0],
+            "status": ["ok", "ok", "ok", "ok", "time limit", "ok", "ok"],
+        }
+    )
+    values, reason = _responses(None, rows, cells)  # type: ignore[arg-type]
+    np.testing.assert_array_equal(values, [2.0, np.nan, np.nan, 5.5])
+    assert reason == "time limit"
+    values, reason = _responses(None, rows[rows["cell"] != 3], cells)  # type: ignore[arg-type]
+    np.testing.assert_array_equal(values, [2.0, np.nan, np.nan, 5.5])
+    assert reason == ""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -25,8 +26,6 @@ from simrail.scenario.requirements import stop_rule_of
 from simrail.scenario.scenario import Scenario, load_scenario
 from simrail.scenario.stop_rule import StopRule, StopState
 from simrail.scoring.bootstrap import interval
-
-pytestmark = pytest.mark.long
 
 Same = Callable[[pd.DataFrame, pd.DataFrame], None]
 Short = Callable[..., Scenario]
@@ -147,6 +146,7 @@ def test_an_imu_with_draws_of_its_own_is_not_waited_for(short: Short) -> None:
     assert not planted(tracks, lambda cell: 9.0 * cell.track_draw * (cell.imu.name == "a"), 3).reached
 
 
+@pytest.mark.long
 def test_coverage_at_the_stop_stays_near_that_of_one_look(short: Short) -> None:
     """Optional stopping costs a little: measured on 200 campaigns of skewed scores (Rayleigh).
 
@@ -226,6 +226,7 @@ def test_it_stops_at_the_same_draws_with_the_same_bits_whoever_runs_it(
     )
 
 
+@pytest.mark.long
 def test_order_of_rides_and_what_is_finished_already_do_not_count(
     all_draws: CampaignResult,
     short: Short,
@@ -245,6 +246,7 @@ def test_order_of_rides_and_what_is_finished_already_do_not_count(
     assert len(found.cells) == 16
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("ended_after", [pytest.param(1, marks=pytest.mark.slow), 4])
 def test_interrupted_within_a_round_it_goes_on_to_the_same(
     ended_after: int, all_draws: CampaignResult, short: Short, tmp_path: Path, assert_same: Same
@@ -270,6 +272,7 @@ def test_interrupted_within_a_round_it_goes_on_to_the_same(
     assert_same(rows_of(all_draws, 8), found.scores)
 
 
+@pytest.mark.long
 def test_progress_counts_the_cells_of_a_round(
     all_draws: CampaignResult, short: Short, tmp_path: Path
 ) -> None:
@@ -291,6 +294,7 @@ def test_progress_counts_the_cells_of_a_round(
     assert watcher.done == [(3, 6), (6, 6), (8, 10), (10, 10), (13, 16), (16, 16)]
 
 
+@pytest.mark.long
 def test_not_reached_after_all_draws_names_the_widest_case(
     all_draws: CampaignResult, short: Short, assert_same: Same
 ) -> None:
@@ -303,6 +307,7 @@ def test_not_reached_after_all_draws_names_the_widest_case(
     assert f"not reached after all {draws} draws of the sensors" in words and "ride.speed_kmh = " in words
 
 
+@pytest.mark.long
 def test_a_figure_that_an_estimator_never_gives_is_not_reached(module_rides: None, short: Short) -> None:
     settings = ["monte_carlo.sensor_draws=3", stop(1.0, estimator="design_angles", quantity="gyro_bias")]
     found = run_campaign(short(*settings), workers=1)
@@ -310,6 +315,7 @@ def test_a_figure_that_an_estimator_never_gives_is_not_reached(module_rides: Non
     assert "unknown for want of values" in found.stopped.words
 
 
+@pytest.mark.long
 def test_one_cell_alone_asks_no_rule(module_rides: None, short: Short) -> None:
     found = run_campaign(short("monte_carlo.sensor_draws=9", stop(9.0)), only=8)
     assert found.stopped is None and list(found.cells["cell"]) == [8]
@@ -350,3 +356,35 @@ def test_results_tell_of_it_and_failed_cells_are_tried_again(
     manifest = json.loads((here / "results" / "mine" / "manifest.json").read_text())
     assert manifest["cells"] == 8 and manifest["stop"]["draws"] == 4 and manifest["stop"]["reached"]
     assert "reached after 4 of 12" in (here / "results" / "mine" / "report.html").read_text()
+
+
+def test_each_look_knows_the_one_before_and_the_last_ends_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of the stages 2, 3 and 5 the second settles it: which cells run next follows from the look before."""
+    asked: list[tuple[int | None, object]] = []
+    looks: list[tuple[int, object]] = []
+    states = {draws: SimpleNamespace(reached=draws == 3, words=f"after {draws}") for draws in (2, 3, 5)}
+
+    def chosen_cells(
+        _plan: object, _only: object = None, *, draws: int | None = None, former: object = None
+    ) -> list:
+        asked.append((draws, former))
+        return []
+
+    def state(_cells: object, _tables: object, draws: int, former: object) -> object:
+        looks.append((draws, former))
+        return states[draws]
+
+    rule = SimpleNamespace(stages=(2, 3, 5), draws=5, state=state)
+    monkeypatch.setattr(campaign, "stop_rule_of", lambda scenario: rule)
+    monkeypatch.setattr(campaign, "chosen_cells", chosen_cells)
+    plan = SimpleNamespace(cells=10, scenario=None)
+    loop = campaign._Loop(plan, b"", Checkpoint(tmp_path), Watcher(), None, None)  # type: ignore[arg-type]
+    assert loop.run(None) is states[3]  # type: ignore[arg-type]
+    assert looks == [(2, None), (3, states[2])]
+    first, second = asked[:3], asked[3:]
+    assert first == [(2, None), (5, None), (None, None)]
+    assert second == [(3, states[2]), (5, states[2]), (None, None)]
+    # What is left to run is chosen as it was counted.
+    assert list(loop._chosen()) == [] and asked[-1] == (3, states[2])

@@ -15,6 +15,7 @@ from shortest_ride import DESIGN, SHORTEST_RIDE
 from simrail import results
 from simrail.campaign import time_limit
 from simrail.cli.main import BAD_INPUT, CELL_FAILED, DONE, call
+from simrail.core.errors import InputError
 from simrail.ride import cache as ride_cache
 from simrail.ride import ride as ride_module
 from simrail.ride import truth_files
@@ -197,3 +198,33 @@ def test_a_lock_that_cannot_be_made_is_no_other_process(
     assert call(mine) == CELL_FAILED
     said = capsys.readouterr().err
     assert "No space left" in said and "another process" not in said
+
+
+def test_one_cell_is_counted_from_0_and_its_command_names_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The first and the last of four cells run, none before or behind; nothing is drawn."""
+    ran: list[int | None] = []
+    said: list[str] = []
+
+    def run_campaign(plan: object, *, only: int | None, watcher: object) -> str:
+        ran.append(only)
+        return "result"
+
+    def write(_draft: Path, _read: object, _campaign: object, manifest: dict[str, str], **_: object) -> None:
+        said.append(manifest["command"])
+
+    monkeypatch.setattr(results, "run_campaign", run_campaign)
+    monkeypatch.setattr(results, "describe", lambda read, campaign: {"command": "simrail run it"})
+    monkeypatch.setattr(results, "_write", write)
+    four = ["ride.speed_kmh=[30, 40]", "monte_carlo.sensor_draws=2", "imu.grade='tactical'"]
+    plan = results.judge_scenario(results.load_scenario("quick_kinematic", overrides=four))
+    monkeypatch.setattr(results, "judge_scenario", lambda read: plan)
+    for cell in (0, 3):
+        assert results.run_cell("quick_kinematic", cell, out=tmp_path / "out", overrides=four) == "result"
+    assert ran == [0, 3] and said == ["simrail run it --cell 0", "simrail run it --cell 3"]
+    for cell in (-1, 4):
+        with pytest.raises(InputError, match="no such cell") as caught:
+            results.run_cell("quick_kinematic", cell, overrides=four)
+        assert (caught.value.field, caught.value.limit) == ("--cell", "0 to 3")
+    assert ran == [0, 3]

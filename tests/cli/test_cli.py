@@ -11,6 +11,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import pandas as pd
 import pytest
@@ -259,6 +260,21 @@ def test_estimator_template_is_a_good_estimator(here: Path) -> None:
     spec.loader.exec_module(module)
     example = run_campaign(load_scenario("quick_kinematic", overrides=SETTINGS)).examples[0]
     check_estimator(module.MyFilter(), example.recording)
+
+
+def test_the_cache_is_told_in_megabytes_of_each_ride_and_of_all(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    held = [
+        SimpleNamespace(key=key * 16, name=f"ride {key}", size_bytes=size)
+        for key, size in (("a", 12e6), ("b", 3e6))
+    ]
+    monkeypatch.setattr("simrail.ride.cache.rides", lambda: held)
+    monkeypatch.setattr("simrail.ride.cache.limit_bytes", lambda: 20e9)
+    assert call(["cache"]) == DONE
+    one, other, total = capsys.readouterr().out.splitlines()
+    assert one.split() == ["12", "MB", "a" * 12, "ride", "a"] and other.split()[:2] == ["3", "MB"]
+    assert total.startswith("2 rides, 15 MB of at most 20 GB (SIMRAIL_CACHE_GB), in ")
 
 
 @pytest.mark.usefixtures("no_drawing")

@@ -11,7 +11,7 @@ import pandas as pd
 import pytest
 from rich.console import Console
 
-from simrail.cli.score_tables import WIDEST, print_scores
+from simrail.cli.score_tables import MOST_NAMES, MOST_TABLES, WIDEST, print_scores
 from simrail.scenario.scenario import Scenario, read_scenario
 from simrail.scoring.table import NO_SAMPLES, OK, QUANTITY_UNITS, SCORE_COLUMNS, TOO_SHORT, UNOBSERVABLE
 
@@ -212,3 +212,52 @@ def test_a_failed_figure_is_a_dash(scenario: Scenario) -> None:
     table.loc[gone, "value"] = None
     table.loc[gone, "status"] = NO_SAMPLES
     assert row_of(shown(scenario, table, cells), SHORT, after="Rails")[2] == "-"
+
+
+def many(rides: int, mounts: tuple[str, ...] = ("body",)) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """Scores and cells of rides at 10, 20, 30 ... km/h; the roll of ride number i is i + 1 times as wrong."""
+    tables, every = [], []
+    for case, (mount, i) in enumerate((mount, i) for mount in mounts for i in range(rides)):
+        table, cells = scores(bands={}, rails=False)
+        names = {"ride": f"ride{i}", "mount": mount}
+        of_roll = (table["quantity"] == "roll") & (table["metric"] == "rms")
+        table.loc[of_roll, "value"] *= i + 1
+        direction = "backward" if i == 0 else "forward"
+        more = {"case": case, "speed_kmh": 10.0 * (i + 1), "direction": direction}
+        tables.append(table.assign(**names, cell=table["cell"] + 2 * case))
+        every.append(cells.assign(**names, **more, cell=cells["cell"] + 2 * case))
+    return pd.concat(tables, ignore_index=True), pd.concat(every, ignore_index=True)
+
+
+def test_few_cases_have_a_table_each(scenario: Scenario) -> None:
+    lines = shown(scenario, *many(MOST_TABLES))
+    assert sum(line.startswith("Attitude: rms error, deg; mean of 2 draws") for line in lines) == MOST_TABLES
+
+
+def test_many_cases_share_a_table_of_least_and_most(scenario: Scenario) -> None:
+    rides = MOST_TABLES + 2
+    lines = shown(scenario, *many(rides))
+    titles = [line for line in lines if line.startswith(("ride0", "Attitude"))]
+    assert len(titles) == 2
+    assert titles[0].startswith(f"ride0, ride1, ride2 and {rides - MOST_NAMES} more: 10 to 60 km/h both ways")
+    assert titles[1] == f"Attitude: rms error, deg; least and most of {rides} kinds of ride, mean of 2 draws"
+    # Of rolls .05, .10 ... .30; the pitch is the same on all.
+    assert row_of(lines, SHORT, after="Attitude") == ["0.050\u20130.300"] * 2 + ["0.050"] * 2
+    assert row_of(lines, DESIGN, after="Attitude")[1:] == ["0.400\u20132.400"] * 2 + ["0.400"] * 2
+    assert "design" not in " ".join(lines[:8]), "no column against the design angles"
+
+
+def test_where_vehicles_differ_a_table_says_which_and_else_does_not(scenario: Scenario) -> None:
+    table, cells = many(MOST_TABLES + 1)
+    assert not any(" of v," in line for line in shown(scenario, table, cells))
+    other, more = table.assign(vehicle="other", cell=table["cell"] + 100), cells.assign(vehicle="other")
+    more = more.assign(cell=more["cell"] + 100, case=more["case"] + 100)
+    text = "\n".join(shown(scenario, pd.concat([table, other]), pd.concat([cells, more]), width=200))
+    assert text.count(" on body of v,") == text.count(" on body of other,") == 1
+
+
+def test_tables_that_are_too_many_are_counted(scenario: Scenario) -> None:
+    mounts = tuple("abcdefg")
+    lines = shown(scenario, *many(2, mounts))
+    assert sum(line.startswith("Attitude") for line in lines) == MOST_TABLES
+    assert f"... and {len(mounts) - MOST_TABLES} more tables: see the report, or scores.csv" in lines

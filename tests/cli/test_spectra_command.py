@@ -5,7 +5,11 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
+from simrail.campaign.spectra import scenario_spectra
 from simrail.cli.main import BAD_INPUT, DONE, call
+from simrail.ride.truth import Mount
+from simrail.scenario.cells import Cell
+from simrail.scenario.scenario import load_scenario
 from simrail.scoring.vibration_levels import COLUMNS
 
 SHAKING = """
@@ -86,6 +90,26 @@ def test_compares_every_mount_with_the_spectra_that_are_named(
     assert beside["ratio"] == pytest.approx(beside["simulated_mps2"], rel=1e-5)
     running = table[table["speed_mps"] > 0.0].groupby("mount")["simulated_mps2"].max()
     assert running["box"] > 10.0 * running["seat"] > 0.0
+
+
+def test_of_every_ride_the_first_draw_counts(scenario: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Three tracks, two devices on each and two draws of their sensors: one ride is simulated, for both."""
+    simulated: list[tuple[int, int]] = []
+
+    def note(cell: Cell, _parts: object, _watcher: object, count: int, total: int) -> Cell:
+        simulated.append((count, total))
+        return cell
+
+    def levels(cell: Cell, mount: Mount) -> dict[float, tuple[int, int, str]]:
+        return {float(cell.ride_index): (cell.sample, cell.track_draw, mount.name)}
+
+    monkeypatch.setattr("simrail.campaign.spectra.simulated", note)
+    monkeypatch.setattr("simrail.campaign.spectra.steady_levels", levels)
+    monkeypatch.setattr("simrail.campaign.spectra.compare", lambda levels, _: levels)
+    draws = ["monte_carlo.track_draws=3", "monte_carlo.sensor_draws=2"]
+    found = scenario_spectra(load_scenario(scenario, overrides=draws), ())
+    assert simulated == [(1, 1)]
+    assert found == {("box", "axle", 0.0): (0, 0, "box"), ("seat", "floor", 0.0): (0, 0, "seat")}
 
 
 @pytest.mark.parametrize(

@@ -4,12 +4,62 @@ from __future__ import annotations
 
 import shlex
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
+import typer
 
-from simrail.cli.main import BAD_INPUT, DONE, call
+from simrail.campaign.tune import tune_recordings
+from simrail.cli.main import BAD_INPUT, DONE, app, call
 from simrail.cli.templates import ride_template
+from simrail.cli.tune import _command
 from simrail.core.toml_files import read_toml
+
+
+def command_of(*words: str) -> list[str]:
+    """What a tuning of these words says that it was made by, as a shell takes it apart."""
+    command = typer.main.get_command(app).commands["tune"]  # type: ignore[attr-defined]
+    return shlex.split(_command(command.make_context("tune", list(words))))
+
+
+def test_the_command_is_what_was_asked_without_its_file() -> None:
+    """What is as it is anyway, and where it is written, do not stand there; the rest does, once each."""
+    words = [
+        "metro table.toml",
+        "--estimator",
+        "A",
+        "--method",
+        "kom",
+        "--draws",
+        "3",
+        "--box",
+        "0.01",
+        "100.0",
+    ]
+    words += ["--parameter", "a b", "--parameter", "c", "--seed", "7", "--set", "ride.speed_kmh=[30, 40]"]
+    told = command_of(*words, "--by-kind", "--out", "here.toml", "--evaluations", "480")
+    assert sorted(told) == sorted(["simrail", "tune", *words, "--by-kind"])
+    assert command_of(*told[2:]) == told
+
+
+def test_what_is_asked_for_goes_before_what_is_usual(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[object] = []
+
+    class Enough(Exception):
+        """What is handed on is known."""
+
+    def tunables_of(estimator: object, chosen: dict[str, object], *, method: str) -> None:
+        asked.extend((estimator, chosen, method))
+        raise Enough
+
+    monkeypatch.setattr("simrail.campaign.tune.tunables_of", tunables_of)
+    usual = {"box": (0.1, 10.0), "parameters": ("axle_yaw_sd",)}
+    mine = SimpleNamespace(usual_search=lambda recordings: usual)
+    with pytest.raises(Enough):
+        tune_recordings([], tmp_path / "t.toml", estimator=mine, settings={"box": (0.5, 2.0)})  # type: ignore[arg-type]
+    assert asked == [mine, {"box": (0.5, 2.0), "parameters": ("axle_yaw_sd",)}, "cml"]
+    assert usual == {"box": (0.1, 10.0), "parameters": ("axle_yaw_sd",)}
+
 
 OWN = '''
 from dataclasses import dataclass

@@ -7,11 +7,15 @@ import re
 import time
 from contextlib import redirect_stdout
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 from simrail.cli.main import BAD_INPUT, DONE, call
-from simrail.core.toml_files import shipped
+from simrail.core.toml_files import load, shipped
+from simrail.report.tables.vehicle_text import _contact_lines, amount, body_rows, critical_words, listed
+from simrail.vehicle.file import VehicleFile
+from simrail.vehicle.stability import CriticalSpeed, Mode
 
 
 @pytest.fixture(scope="module")
@@ -91,3 +95,47 @@ def test_a_scale_vehicle_is_told_in_figures_of_its_size(capsys: pytest.CaptureFi
     assert "wheel S1002 on rail 60E1 at 1:10, gauge 127 mm" in text
     at_3_mm = re.search(r"equivalent conicity at 0.29 mm: (0\.\d+)", text)
     assert at_3_mm and 0.15 < float(at_3_mm[1]) < 0.2
+
+
+def test_contact_is_told_in_millimetres_of_the_model() -> None:
+    """At a tenth: whole millimetres of full size are listed, and the conicity is that of a tenth of 3 mm."""
+    model = load(VehicleFile, "vehicle", "scale_vehicle").model("scale_vehicle")
+    conicity = SimpleNamespace(
+        steers=True,
+        scale=0.1,
+        amplitude_m=(1e-4, 1.5e-4, 2e-4),
+        equivalent=(0.111, 0.222, 0.333),
+        at_3_mm=0.17,
+    )
+    first, *_, last = _contact_lines(SimpleNamespace(model=model, conicity=conicity))  # type: ignore[arg-type]
+    assert first.startswith("wheel S1002 on rail 60E1 at 1:10, gauge 127 mm, inclination 1:")
+    assert last == (
+        "equivalent conicity at 0.3 mm: [bold]0.170[/bold]; over the amplitude: 0.1 mm 0.111, 0.2 mm 0.333"
+    )
+    assert [row[0] for row in body_rows(model)] == list(model.body_names)
+    assert body_rows(model)[0][1:5] == ("1.6", "0.00695", "5e-05", "0.00695")
+    assert (amount(99.96), amount(100.0), amount(16100.4)) == ("100", "100", "16,100")
+
+
+@pytest.mark.parametrize(
+    ("critical", "words"),
+    [
+        (CriticalSpeed(50.0, 1.5, (5.0, 100.0)), "180.0 km/h (above it an oscillation of 1.50 Hz grows)"),
+        (CriticalSpeed(None, None, (5.0, 100.0)), "none below 360 km/h"),
+        (
+            CriticalSpeed(5.0, 1.5, (5.0, 100.0), True),
+            "below 18 km/h already (an oscillation of 1.50 Hz grows)",
+        ),
+    ],
+)
+def test_the_critical_speed_is_told_in_kilometres_an_hour(critical: CriticalSpeed, words: str) -> None:
+    assert critical_words(critical) == words
+
+
+def test_modes_of_contact_springs_and_such_as_hardly_swing_are_not_listed() -> None:
+    slow, fast = Mode(complex(-1.0, 6.0), {}), Mode(complex(-1.0, 260.0), {})  # 260/s is 41.4 Hz
+    creeping = Mode(complex(-6.0, 1.0), {})  # damping 6 / sqrt(37) = 0.986
+    assert listed([slow, fast, creeping, Mode(complex(0.5, 250.0), {})]) == [
+        slow,
+        Mode(complex(0.5, 250.0), {}),
+    ]

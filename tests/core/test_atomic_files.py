@@ -71,6 +71,18 @@ def test_a_former_one_beside_the_new_one_goes(tmp_path: Path) -> None:
     assert sorted(path.name for path in tmp_path.iterdir()) == [".results_b.1.former", "results"]
 
 
+def test_of_two_former_ones_the_last_comes_back(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Killed twice between the renames: the numbers of processes say nothing of which was first."""
+    monkeypatch.setattr(atomic_files, "_IN_MOTION_S", 0.0)
+    for name, seconds in (("7", 2000.0), ("123", 3000.0), ("5", 1000.0)):
+        former = tmp_path / f".results.{name}.former"
+        former.mkdir()
+        (former / "made_by").write_text(name)
+        os.utime(former, (seconds, seconds))
+    assert restore(tmp_path / "results")
+    assert (tmp_path / "results" / "made_by").read_text() == "123"
+
+
 def test_another_process_between_its_renames_is_waited_for(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from simrail.core.errors import InputError
-from simrail.core.resample import GAPS, find_gaps, rate_of, resample, uniform_times
+from simrail.core.resample import GAPS, find_gaps, rate_of, refuse_long_gaps, resample, uniform_times
 from simrail.core.toml_files import blame
 
 RATE = 100.0
@@ -73,6 +73,26 @@ def test_gaps_up_to_the_limit_are_bridged_and_longer_ones_refused():
         "longest_gap_s = 0.1 s",
     ):
         assert words in message, message
+
+
+def test_of_several_long_gaps_the_first_is_named_and_the_others_counted():
+    gaps = pd.DataFrame(
+        {"start_s": [1.0, 5.0, 8.0, 20.0], "end_s": [1.5, 7.0, 11.0, 24.0], "missing": [4, 19, 29, 39]}
+    )
+    with pytest.raises(InputError) as caught:
+        refuse_long_gaps(gaps, 1.0, what="odometer.speed")
+    said = str(caught.value)
+    for words in (
+        "gap of 19 samples",
+        "(and 2 more such gaps)",
+        "2 s after time_s = 5",
+        "raise odometer.longest",
+    ):
+        assert words in said
+    with pytest.raises(InputError) as caught:
+        refuse_long_gaps(gaps.iloc[[1]], 1.0)
+    assert "more such" not in str(caught.value)
+    refuse_long_gaps(gaps, 4.0)
 
 
 def test_what_counts_as_a_gap_is_stated():

@@ -27,7 +27,12 @@ from simrail.estimators.trajectory.smoother import TrajectorySmoother
 from simrail.cli.templates import write_template
 from simrail.core.columns import ATTITUDE, IRREGULARITY
 from simrail.estimation.choose_odometry import with_odometry
-from simrail.estimation.conformance import check_estimator, check_odometry, require_well_formed
+from simrail.estimation.conformance import (
+    check_estimator,
+    check_odometry,
+    prefix_lengths,
+    require_well_formed,
+)
 from simrail.estimation.estimate import Estimate, Estimator
 from simrail.estimation.user_modules import class_named
 from simrail.recording.recording import Recording
@@ -492,3 +497,15 @@ def test_a_planted_fault_is_caught_by_its_check(faulty: Callable, check: str, wo
 
 def test_a_smoother_may_look_ahead() -> None:
     check_estimator(SmootherThatSaysSo(), ride())
+
+
+def test_prefixes_end_at_the_start_about_rests_and_at_the_end() -> None:
+    """Of 3 s of rest at first and a rest at last, at the rate of the ride."""
+    recording = ride()
+    n, rate = len(recording.imu), recording.imu_sheet.rate_hz
+    lengths = prefix_lengths(recording)
+    assert lengths == sorted(set(lengths)) and lengths[0] == 2 and lengths[-1] == n - 1
+    assert {n // 3, n // 2 + 1} <= set(lengths)
+    assert sum(0.8 * rate < length < 1.2 * rate for length in lengths) == 1  # within the first rest
+    assert sum(2.4 * rate < length < 3.2 * rate for length in lengths) == 2  # at its end
+    assert sum(n - 6.0 * rate < length < n - 1 for length in lengths) >= 1  # within the last

@@ -65,6 +65,18 @@ def test_hard_iron_is_found_and_named() -> None:
         check_hard_iron(ride((40.0, -10.0, 25.0)))
 
 
+def test_a_bridge_on_the_way_is_no_iron_of_the_vehicle() -> None:
+    """Steel beside a quarter of the ride: by the mean it would be 10 uT of the vehicle's own."""
+    sound = ride((20.0, -10.0, 15.0))
+    assert sound.magnetometer is not None
+    field = sound.magnetometer.copy()
+    field.iloc[100:200] += 40e-6
+    offset = field_offset(replace(sound, magnetometer=field))
+    assert offset is not None
+    # A quarter above moves the median to the noise's 67 % point, 0.43 standard deviations, and its error.
+    np.testing.assert_allclose(1e6 * offset, [20.0, -10.0, 15.0], atol=(0.44 + 5 * 1.5 / np.sqrt(300)) * 0.03)
+
+
 def test_without_odometry_its_dip_is_told() -> None:
     told = field_warnings(replace(ride((30.0, 0.0, 30.0)), odometry=None))
     assert len(told) == 1 and "dips by" in told[0]

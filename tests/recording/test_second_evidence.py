@@ -15,7 +15,7 @@ from simrail.estimation.choose_odometry import with_odometry
 from simrail.recording.check_physics import check_plausible
 from simrail.recording.check_sheet import check_ranges, noise_warnings
 from simrail.recording.evidence.devices import weigh_all
-from simrail.recording.evidence.field_clock import weigh_field_clock
+from simrail.recording.evidence.field_clock import _longer, weigh_field_clock
 from simrail.recording.evidence.finding import Finding
 from simrail.recording.evidence.judge import Evidence, weigh
 from simrail.recording.evidence.second import _clock, _spacing
@@ -94,6 +94,20 @@ def planted(sound: Recording, key: str, size: float) -> Recording:
         time = time - size if key == "offset" else time * (1.0 - 1e-6 * size)
         return replace(sound, second_imu=second.imu.set_axis(pd.Index(time, name="time_s")))
     return replace(sound, second_imu=PLANTS[key](second, size).imu)
+
+
+def test_the_second_imu_alone_is_behind_on_its_own_body(sound: Recording) -> None:
+    """Its place is the first one's less the spacing, at the start and on the way; the rest is its own."""
+    place = pd.DataFrame({"position_m": [20.0, 30.0], "speed_mps": [0.0, 5.0]}, index=[0.0, 3.0])
+    alone = second_alone(replace(sound, odometry=place))
+    sheet = sound.second_imu_sheet
+    assert alone is not None and alone.odometry is not None and sheet is not None
+    assert alone.start_position_m == sound.start_position_m - SPACING
+    np.testing.assert_array_equal(alone.odometry, [[20.0 - SPACING, 0.0], [30.0 - SPACING, 5.0]])
+    assert place["position_m"].tolist() == [20.0, 30.0]
+    assert alone.imu.equals(sound.second_imu) and alone.imu_sheet == sheet.imu
+    assert (alone.mount_body, alone.mount_position_m) == ("other", (0.0, 0.0, 0.6))
+    assert second_alone(alone) is None
 
 
 def test_a_sound_ride_is_left_alone_and_what_was_told_before_stays(sound: Recording) -> None:
@@ -187,6 +201,40 @@ def test_on_the_straight_a_magnetometer_tells_nothing_of_its_clock(sound: Record
     still = sound.magnetometer - sound.magnetometer + sound.magnetometer.iloc[0]
     found = weigh_all(replace(sound, imu=quiet, magnetometer=still)).of("magnetometer_offset")
     assert found.verdict == "could not be judged" and not found.wrong
+
+
+@pytest.mark.parametrize(
+    ("whole", "columns", "verdicts"),
+    [
+        ("sound", True, ["sound", "axis", "second", "clock"]),
+        ("surely wrong", False, ["surely wrong", "second", "clock"]),
+        ("surely wrong", True, ["could not be judged", "axis", "second", "clock"]),
+    ],
+)
+def test_axes_are_judged_where_no_device_is_wrong_or_each_column_by_itself(
+    whole: str, columns: bool, verdicts: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def found(verdict: str) -> Finding:
+        return Finding("gyro", "the gyro", 1.0, 0.1, 0.0, "1", "curves", verdict)
+
+    place = "simrail.recording.evidence.devices"
+    monkeypatch.setattr(f"{place}.weigh", lambda _: Evidence((found(whole),)))
+    monkeypatch.setattr(f"{place}.weigh_axes", lambda _: (found("axis"),))
+    monkeypatch.setattr(f"{place}.are_columns", lambda _: columns)
+    monkeypatch.setattr(f"{place}.weigh_second", lambda *_: (found("second"),))
+    monkeypatch.setattr(f"{place}.weigh_field_clock", lambda _: (found("clock"),))
+    told = weigh_all(None)  # type: ignore[arg-type]
+    assert [finding.verdict for finding in told.findings] == verdicts
+
+
+def test_residuals_that_hang_together_count_for_fewer() -> None:
+    """Blocks of 1 s, ten lags with weights 1 - lag / 11: all alike 1 + 2 sum = 11, in turn no less than 1."""
+    alike = np.full((80, 3), 0.5)
+    assert _longer(alike, 1.0) == pytest.approx(0.5 * np.sqrt(11.0))
+    assert _longer(alike * (-1.0) ** np.arange(80)[:, None], 1.0) == pytest.approx(0.5)
+    # 2 s: five lags; of 8 blocks two.
+    assert _longer(alike, 2.0) == pytest.approx(0.5 * np.sqrt(6.0))
+    assert _longer(alike[:8], 1.0) == pytest.approx(0.5 * np.sqrt(3.0))
 
 
 def test_clocks_and_distances_of_two_fits() -> None:

@@ -27,8 +27,6 @@ from simrail.scoring.statistics import compare
 from simrail.scoring.table import INTEGER_COLUMNS, SCORE_COLUMNS, as_score_table
 from simrail.track.bands import BANDS
 
-pytestmark = pytest.mark.long
-
 Scores = tuple[pd.DataFrame, pd.DataFrame]
 """Score table and table of cells."""
 
@@ -205,6 +203,7 @@ def roll(small: Scores, window: str = "whole") -> pd.DataFrame:
     return rows.merge(cells.drop(columns=["imu", "track_draw", "sensor_draw", "ride", "vehicle"]), on="cell")
 
 
+@pytest.mark.long
 def test_every_axis_is_told_once_and_in_order(small: Scores) -> None:
     found = campaign_axes(small[1])
     assert [axis.column for axis in found] == ["speed_kmh", "direction", "imu", "irregularity.scale"]
@@ -236,6 +235,7 @@ def with_exact(small: Scores) -> Scores:
     return as_score_table(pd.concat(parts, ignore_index=True)), pd.concat([exact, erring], ignore_index=True)
 
 
+@pytest.mark.long
 def test_an_exact_map_is_an_axis_and_no_part_of_any_other_mean(
     small: Scores, with_exact: Scores, tables: Frames, styles: list[MethodStyle]
 ) -> None:
@@ -262,6 +262,7 @@ def test_an_exact_map_is_an_axis_and_no_part_of_any_other_mean(
         assert means[method, "exact (ablation)"] == pytest.approx(0.1 * means[method, "the map errs"])
 
 
+@pytest.mark.long
 def test_heat_maps_show_the_means(small: Scores, styles: list[MethodStyle]) -> None:
     scores, cells = small
     axes = {axis.column: axis for axis in campaign_axes(cells)}
@@ -279,6 +280,7 @@ def test_heat_maps_show_the_means(small: Scores, styles: list[MethodStyle]) -> N
     assert "20 \u2192" in svg and "70 \u2190" in svg
 
 
+@pytest.mark.long
 def test_an_axis_that_follows_from_another_has_no_map(small: Scores) -> None:
     """Each place has its own grade here, and two places share one."""
     _, cells = small
@@ -291,6 +293,7 @@ def test_an_axis_that_follows_from_another_has_no_map(small: Scores) -> None:
     assert fine == ["speed_kmh", "direction", "irregularity.scale", "mount"]
 
 
+@pytest.mark.long
 def test_rails_are_mapped_in_the_band_that_counts(small: Scores, styles: list[MethodStyle]) -> None:
     scores, cells = small
     axes = campaign_axes(cells)
@@ -323,6 +326,7 @@ def test_long_names_are_told_in_two_lines() -> None:
     assert in_two("axle_ideal") == "axle_ideal" and in_two("a" * 30) == "a" * 30
 
 
+@pytest.mark.long
 def test_boxes_and_curvature_are_drawn(small: Scores, styles: list[MethodStyle], example: object) -> None:
     scores, cells = small
     axes = campaign_axes(cells)
@@ -342,6 +346,7 @@ def test_boxes_and_curvature_are_drawn(small: Scores, styles: list[MethodStyle],
     assert curvature_figure([straight], styles, words=["x"], what="curvature") == ""
 
 
+@pytest.mark.long
 def test_methods_have_the_mean_over_all_rides_of_an_imu(small: Scores, tables: Frames) -> None:
     """Never over several IMUs: what somebody chooses is not averaged."""
     rows = tables["methods"].query("quantity == 'roll' and window == 'whole'")
@@ -358,6 +363,7 @@ def test_methods_have_the_mean_over_all_rides_of_an_imu(small: Scores, tables: F
     assert (spread["sd_sensor"] < 0.1).all() and (spread["sd_track"] < 0.1).all()
 
 
+@pytest.mark.long
 def test_pairs_compare_the_same_recordings(small: Scores, tables: Frames) -> None:
     whole = roll(small).pivot_table(index="cell", columns="estimator", values="value", observed=True)
     tracks, imus = (small[1].set_index("cell")[name] for name in ("track_draw", "imu"))
@@ -374,6 +380,7 @@ def test_pairs_compare_the_same_recordings(small: Scores, tables: Frames) -> Non
         assert row["win_rate"] == found.win_rate.value and row["pairs"] == len(plain)
 
 
+@pytest.mark.long
 def test_worst_cells_are_the_worst_and_say_how_to_make_them_again(small: Scores, tables: Frames) -> None:
     cells, plain = small[1], roll(small)
     ours = plain[plain["estimator"] == "ekf_compensated"].sort_values("value", ascending=False)
@@ -385,6 +392,7 @@ def test_worst_cells_are_the_worst_and_say_how_to_make_them_again(small: Scores,
         assert row["command"] == f"simrail run made_up --set 'seed=2' --cell {row['cell']}"
 
 
+@pytest.mark.long
 def test_tables_are_written_as_csv_and_latex(tables: Frames, tmp_path: Path) -> None:
     write_tables(tmp_path, tables)
     assert set(tables) == {"methods", "axes", "pairs", "consistency", "worst"}
@@ -426,6 +434,7 @@ def small_page(made_up: Scenario, small: Scores, tmp_path_factory: pytest.TempPa
     return folder / "report.html"
 
 
+@pytest.mark.long
 def test_the_page_has_the_section_and_its_tables(small_page: Path) -> None:
     page = small_page.read_text(encoding="utf-8")
     for words in (
@@ -445,6 +454,7 @@ def test_the_page_has_the_section_and_its_tables(small_page: Path) -> None:
     assert "nan" not in re.sub(r"<style>.*?</style>", "", page, flags=re.DOTALL).lower().split()
 
 
+@pytest.mark.long
 def test_a_cell_is_made_again_without_what_stands_beside(small_page: Path) -> None:
     """`simrail run` refuses both together."""
     page = small_page.read_text(encoding="utf-8")
@@ -452,6 +462,7 @@ def test_a_cell_is_made_again_without_what_stands_beside(small_page: Path) -> No
     assert "<pre>simrail run made_up.toml --beside results/other</pre>" in page
 
 
+@pytest.mark.long
 def test_intervals_say_whether_they_are_over_tracks(
     made_up: Scenario, small_page: Path, tmp_path: Path
 ) -> None:
@@ -461,6 +472,7 @@ def test_intervals_say_whether_they_are_over_tracks(
         assert ("with one track only" in page) is (tracks == 1)
 
 
+@pytest.mark.long
 def test_methods_that_fail_leave_the_rest_standing(made_up: Scenario, small: Scores, tmp_path: Path) -> None:
     scores, cells = small
     broken = (scores["estimator"] == "vqf").to_numpy() | (scores["cell"] < 30).to_numpy()

@@ -4,6 +4,7 @@ import base64
 import json
 import re
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -12,11 +13,17 @@ from PIL import Image
 
 from simrail import InputError, load_scenario
 from simrail.cli.main import call
-from simrail.report.film.film import FRAME_HZ, Film, film_of, scenario_of
+from simrail.core.toml_files import load
+from simrail.report.film import gif
+from simrail.report.film.film import FRAME_HZ, Film, _film, _rows, film_of, scenario_of
 from simrail.report.film.gif import GIF_HZ, pace, write_gif
 from simrail.report.film.page import film_data, write_film
 from simrail.report.film.shapes import boxes_of, discs_of, profile_lines
+from simrail.ride.kinematic import kinematic_truth
 from simrail.scoring.table import SCORE_COLUMNS
+from simrail.track.design import Straight, TrackDesign
+from simrail.vehicle.file import VehicleFile
+from simrail.vehicle.speed_profile import SpeedProfile
 
 SHORT = ["ride.end_m=190.0", "ride.rest_s=1.0", "ride.final_rest_s=1.0", "monte_carlo.sensor_draws=1"]
 
@@ -115,10 +122,13 @@ def test_faulty_input_is_one_line(own_cache, options, field, limit):
 
 def test_command_refuses_before_it_writes(here, capsys):
     assert call(["film", "quick_kinematic", "--out", "film.txt"]) == 2
+    assert call(["film", "quick_kinematic", "--gif", "film.html"]) == 2
     assert call(["film", "quick_kinematic", "--gif", "a.gif", "--out", "a.html"]) == 2
     assert call(["film", "no_such"]) == 2
     lines = capsys.readouterr().err.strip().splitlines()
-    assert len(lines) == 3
+    assert len(lines) == 4
+    told = ("--out", "FILE.html"), ("--gif", "FILE.gif"), ("--out --gif", "one of"), ("no_such", "")
+    assert all(field in line and limit in line for line, (field, limit) in zip(lines, told, strict=True))
     assert not list(here.iterdir())
 
 
@@ -173,3 +183,91 @@ def test_shapes_are_made_of_the_model(film):
     # Set down in the middle, the wheel just touches its rail: they meet within 0.2 mm, and nowhere deeper.
     gap = np.interp(rail[:, 0] - offset, wheel[:, 0], wheel[:, 1]) - rail[:, 1]
     assert abs(gap.min()) < 2e-4
+
+
+def test_a_frame_is_beams_over_the_axle_boxes_with_transoms_between() -> None:
+    vehicle = load(VehicleFile, "vehicle", "manchester_1").model("manchester_1")
+    frame = vehicle.body("frame_front")
+    boxes = [box for box in boxes_of(vehicle) if box.body == frame.name]
+    corners = np.array([box.corners for box in boxes if box.kind == "frame"])
+    assert len(corners) == len(boxes) == 14
+    beams, transoms = corners[:12], corners[12:]
+    inner = np.abs(beams[..., 1]).min()
+    assert np.abs(transoms[..., 1]).max() == pytest.approx(inner)  # they end where the beams begin
+    ends = np.sort(np.abs(beams[..., 0]).max(axis=1))
+    assert np.diff(np.unique(ends.round(9))) == pytest.approx(ends[0])  # pieces without gaps between
+    axles = np.array([box.corners for box in boxes_of(vehicle) if box.kind == "axle"])
+    assert corners[..., 1].max() == pytest.approx(axles[..., 1].max())
+
+
+def test_rows_of_a_range_hold_both_of_its_ends() -> None:
+    """At 100 rows a second and 25 frames a second; 0.1 m a row, out and back."""
+    place = np.concatenate([np.arange(0.0, 100.0, 0.1), np.arange(100.0, 0.0, -0.1)])
+    track = SimpleNamespace(
+        start_m=0.0, end_m=200.0, curvature=lambda s: np.where((s > 40.0) & (s < 60.0), -1e-3, 0.0)
+    )
+    time = np.arange(len(place)) / 100.0
+    ride = SimpleNamespace(reference_position_m=place, time_s=time, rate_hz=100.0, track=track)
+    assert _rows(ride, 19.95, 60.05) == range(200, 601, 4)  # type: ignore[arg-type]
+    assert _rows(ride, 60.05, 19.95) == range(200, 601, 4)  # type: ignore[arg-type]
+    assert _rows(ride, None, 60.05) == range(0, 601, 4)  # type: ignore[arg-type]
+    assert _rows(ride, 79.95, None) == range(800, 1201, 4)  # type: ignore[arg-type]
+    assert _rows(ride, None, None) == range(0, 2000, 4)  # type: ignore[arg-type]
+    # Of a long ride the minute about its sharpest curve, which begins 24 s into it.
+    ride.reference_position_m = np.arange(20_000) / 100.0
+    ride.time_s = np.arange(20_000) / 100.0
+    assert _rows(ride, None, None) == range(1604, 7605, 4)  # type: ignore[arg-type]
+    track.curvature = lambda s: np.where(s > 190.0, 1e-3, 0.0)
+    assert _rows(ride, None, None) == range(13_999, 20_000, 4)  # type: ignore[arg-type]
+
+
+def test_what_is_farther_is_drawn_before_what_hides_it(film, monkeypatch):
+    """Seen from behind: depth is the place along the track; car bodies come last, as glass."""
+    drawn = []
+    monkeypatch.setattr(gif, "_draw_box", lambda *given, glass=False: drawn.append((*given[2:4], glass)))
+    monkeypatch.setattr(gif, "_draw_disc", lambda *given: drawn.append((*given[2:4], False)))
+    camera = SimpleNamespace(depth=lambda places: places.T[0] if places.ndim == 2 else places[0])
+    gif._draw_vehicle(film, None, camera, 50)
+    depth = [
+        gif._placed(pose, part.corners if hasattr(part, "corners") else np.array([part.middle_m]))[
+            :, 0
+        ].mean()
+        for pose, part, glass in drawn
+        if not glass
+    ]
+    glasses = [glass for _, _, glass in drawn]
+    assert len(depth) > len(film.vehicle.wheels) and np.ptp(depth) > 1.0
+    assert (np.diff(depth) <= 1e-9).all()
+    assert glasses == sorted(glasses) and glasses[-1]
+
+
+def test_everything_of_a_film_is_at_its_frames(monkeypatch):
+    """Forces of every fifth row, wheels of each, attitudes by the IMU's times: each tells its time."""
+    line = TrackDesign("line", 0.0, (Straight(200.0),))
+    truth = kinematic_truth(line, SpeedProfile(50.0, 90.0, 10.0, rest_s=1.0))
+    time = truth.time_s
+    kept = np.column_stack([time[::5], 2.0 * time[::5]])
+    truth = replace(truth, contacts={"w": kept}, contact_every=5, wheel_angles={"w": 3.0 * time})
+    when = pd.Index(time[7:-9:4], name="time_s")
+    told = pd.DataFrame({"roll_rad": 4.0 * when.to_numpy(), "pitch_rad": 5.0 * when.to_numpy()}, index=when)
+    cell = SimpleNamespace(ride=SimpleNamespace(name="r"), imu=SimpleNamespace(grade="g.toml", name="n"))
+    ride = SimpleNamespace(vehicle=SimpleNamespace(bodies=()), engine="compiled")
+    parts = SimpleNamespace(
+        resolve=lambda _: SimpleNamespace(ride=ride, mount=None), rails=lambda _: "the rails"
+    )
+    seen = SimpleNamespace(
+        recording=SimpleNamespace(imu=told),
+        estimates={"ekf": SimpleNamespace(states=0.5 * told), "speed": SimpleNamespace(states=told[[]])},
+        motion=told,
+    )
+    monkeypatch.setattr("simrail.report.film.film._signals", lambda *_: ())
+    monkeypatch.setattr("simrail.report.film.film._notes", lambda *_: ())
+    made = _film(SimpleNamespace(name="s"), cell, parts, truth, seen, range(500, 1900, 40))
+    frames = time[500:1900:40]
+    np.testing.assert_array_equal(made.time_s, frames)
+    np.testing.assert_array_equal(made.reference_m, truth.reference_position_m[500:1900:40])
+    np.testing.assert_allclose(made.contacts["w"], np.column_stack([frames, 2.0 * frames]), atol=1e-12)
+    np.testing.assert_allclose(made.turns_rad["w"], 3.0 * frames, atol=1e-12)
+    np.testing.assert_allclose(made.true_rad, np.column_stack([4.0 * frames, 5.0 * frames]), atol=1e-12)
+    assert list(made.estimated_rad) == ["ekf"] and made.imu == "g (n)"
+    np.testing.assert_allclose(made.estimated_rad["ekf"], 0.5 * made.true_rad, atol=1e-12)

@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable
 from html.parser import HTMLParser
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -16,7 +17,7 @@ from simrail.campaign.cell import CellResult
 from simrail.core.columns import ACCEL, GYRO, IMU
 from simrail.estimation.estimate import Estimate
 from simrail.report.pages.explorer import stored_rides
-from simrail.report.pages.page import write_report
+from simrail.report.pages.page import _failures, write_report
 from simrail.report.words.sentences import axis_words
 from simrail.scenario.scenario import Scenario
 from simrail.scoring.table import LABEL_COLUMNS, concat_scores, failed_figures, labelled
@@ -213,3 +214,24 @@ def test_axes_are_said_as_people_say_them(name, value, words):
 
 def test_columns_used_by_the_figures_are_the_vocabulary() -> None:
     assert set(GYRO) | set(ACCEL) == set(IMU)
+
+
+def test_what_failed_is_counted_in_figures_by_method_imu_and_kind_of_fault() -> None:
+    """Two figures of one cell are two; how many samples of a window a fault hit parts no kinds."""
+    nan = "not finite in {} of 900 samples"
+    rows = [
+        ("ekf", "lord", 0, nan.format(3)),
+        ("ekf", "lord", 0, nan.format(17)),
+        ("ekf", "lord", 1, nan.format(900)),
+        ("ekf", "ideal", 2, nan.format(3)),
+        ("gda", "lord", 0, "time limit"),
+        ("gda", "lord", 0, "ok"),
+    ]
+    scores = pd.DataFrame(rows, columns=["estimator", "imu", "cell", "status"])
+    (section,) = _failures(SimpleNamespace(scores=scores))  # type: ignore[arg-type]
+    assert sorted(section.data["failures"]) == [
+        ("ekf", "ideal", 1, "not finite"),
+        ("ekf", "lord", 3, "not finite"),
+        ("gda", "lord", 1, "time limit"),
+    ]
+    assert _failures(SimpleNamespace(scores=scores[scores["status"] == "ok"])) == []  # type: ignore[arg-type]

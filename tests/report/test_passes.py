@@ -2,10 +2,18 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pandas as pd
 
-from simrail.report.campaign.passes import groups_of, passes_figure, passes_of, passes_table
+from simrail.report.campaign.passes import (
+    groups_of,
+    passes_figure,
+    passes_of,
+    passes_section,
+    passes_table,
+)
 from simrail.report.tables.methods import MethodStyle
 from simrail.report.tables.pivot import Case, Mean
 from simrail.track.bands import BANDS
@@ -74,3 +82,13 @@ def test_the_figure_has_a_line_for_each_band_and_number() -> None:
     assert svg.startswith("<svg") and all(
         f">{word}<" in svg for word in ("D0", "D1", "D2", "D3", "passes", "16")
     )
+
+
+def test_each_group_says_which_imu_it_is_of() -> None:
+    cases = [case(n, mount=mount) for mount in ("axle", "frame") for n in ("1", "4")]
+    (section,) = passes_section(SimpleNamespace(cases=cases, styles=(STYLE,)))  # type: ignore[arg-type]
+    titles = [title for title, _, _ in section.data["shown"]]
+    assert [title.split(",")[0] for title in titles] == [
+        f"the smoother: IMU {mount} (lord)" for mount in ("axle", "frame")
+    ]
+    assert passes_section(SimpleNamespace(cases=cases[:1], styles=(STYLE,))) == []  # type: ignore[arg-type]

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
 
+from simrail.core.columns import IMU
 from simrail.estimation.estimate import Estimate
+from simrail.recording.recording import ImuSheet, Recording
+from simrail.report.pages.estimate_page import _gaps, _tiles, design_differences, ride_facts
 from simrail.report.tables.recorded import (
     NO_DRAWS,
     MethodResult,
@@ -21,6 +25,7 @@ from simrail.report.tables.recorded import (
     reference_table,
 )
 from simrail.scoring.table import FIGURE_COLUMNS
+from simrail.track.design import Straight, TrackDesign
 from simrail.track.rail_limits import EXAMPLE_LIMITS, EXCEEDANCES, RailLimits, RailLine
 
 TIME = pd.Index(np.arange(0.0, 10.0, 0.01), name="time_s")
@@ -105,3 +110,56 @@ def test_a_reference_is_never_called_a_truth():
 def test_rails_over_distance_have_a_column_for_each_band():
     frame = rails_over_distance(result("one", 0.0, None, rails=1e-3, sd=np.ones(len(PLACE))).lines)
     assert list(frame) == ["alignment_D1_m", "alignment_D1_sd_m"] and frame.index.name == "position_m"
+
+
+def ridden(**more: Any) -> Recording:
+    """Ten seconds along a straight, 2.5 m every second."""
+    track = TrackDesign("my line", 0.0, (Straight(200.0),))
+    odometry = pd.DataFrame({"position_m": 50.0 + 2.5 * TIME.to_numpy(), "speed_mps": -2.5}, index=TIME)
+    given = {"encoder": None, "encoder_sheet": None, "odometry": odometry, "odometry_source": "encoder"}
+    return Recording(
+        name="ride",
+        imu=pd.DataFrame(0.0, index=TIME, columns=list(IMU)),
+        imu_sheet=ImuSheet("mine", 100.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+        mount="imu",
+        mount_body="frame",
+        mount_position_m=(1.0, 0.25, 0.6),
+        track=track,
+        start_position_m=50.0,
+        **(given | more),
+    )
+
+
+def test_a_ride_is_told_in_samples_metres_and_kilometres_an_hour():
+    gaps = pd.DataFrame({"start_s": [1.0, 4.0], "end_s": [1.1, 4.05], "missing": [9.0, 1.0]})
+    samples, way, imu, source = ride_facts(ridden(gaps=gaps))
+    assert samples == "1000 samples at 100 Hz, 10.0 s; 10 of them lost and interpolated, in 2 gaps"
+    assert way == "from s = 50.0 to 75.0 m of track 'my line', at most 9.0 km/h"
+    assert imu == "IMU mine at 100 Hz on 'frame', 1, 0.25, 0.6 m (forward, left, up)"
+    assert source == "position and speed from the odometry 'encoder'"
+    assert _gaps(ridden(gaps=gaps)) == [
+        "9 samples between 1.000 and 1.100 s",
+        "1 sample between 4.000 and 4.050 s",
+    ]
+    many = pd.concat([gaps] * 11, ignore_index=True)
+    assert len(_gaps(ridden(gaps=many))) == 21 and _gaps(ridden(gaps=many))[-1] == "and 2 more"
+    bare = ride_facts(ridden(odometry=None))
+    assert bare[0].endswith("; no gaps") and bare[1] == "from s = 50.0 m of track 'my line'"
+
+
+def test_what_an_estimate_differs_from_the_design_by_is_told_in_degrees():
+    """Rolled by 3 deg one half of the way and by 4 deg the other: rms 3.54 deg; a turn more is none."""
+    roll = np.radians(np.where(np.arange(len(TIME)) < 500, 3.0, 4.0)) + 2.0 * np.pi
+    states = pd.DataFrame({"roll_rad": roll, "pitch_rad": 0.0}, index=TIME)
+    found = MethodResult(
+        "one", "the one", "one()", ridden(), Estimate(states=states, mount="imu"), (), 12.34, ()
+    )
+    assert design_differences(found) == pytest.approx({"roll": np.sqrt(12.5), "pitch": 0.0})
+    tiles = _tiles(SimpleNamespace(results=[found], limits=None))
+    assert [(what, value) for what, value, _ in tiles] == [
+        ("way", "25 m"),
+        ("roll less design", "3.536\u00b0"),
+        ("pitch less design", "0.000\u00b0"),
+        ("time", "12.3 s"),
+    ]
+    assert tiles[0][2] == "in 10 s"

@@ -11,10 +11,13 @@ import pytest
 
 from simrail.campaign.cell import CellResult
 from simrail.report.figures import canvas
-from simrail.report.tables.methods import method_styles
+from simrail.report.tables.geometry import behind_baseline, is_zero
+from simrail.report.tables.methods import MethodStyle, method_styles
 from simrail.report.tables.pivot import Case, Mean, _index, cases, of_cell
+from simrail.report.tables.provenance import _irregularities, facts
 from simrail.report.tables.running import running_table
-from simrail.report.tables.tables import NONE, Cell, Row, Table, error_table, without_empty
+from simrail.report.tables.tables import NONE, Cell, Row, Table, error_table, number_cell, without_empty
+from simrail.scenario.line_tables import IrregularityPart
 from simrail.scenario.scenario import Scenario, load_scenario
 from simrail.scoring.ride_figures import RIDE
 
@@ -144,3 +147,72 @@ def test_running_safety_is_told_by_what_is_left_and_by_shares_of_its_own_limits(
     cells = [cell.text for cell in table.rows[0].cells]
     assert dict(zip(table.columns, cells, strict=True))["\u03a3Y max, kN"] == "12.3"
     assert [text for text in cells if text != "12.3"] == ["0.600", "0.200", "25", "70"]
+
+
+def test_what_the_rails_deviate_by_is_told_with_its_sizes() -> None:
+    spectrum = IrregularityPart(spectrum="erri_b176_low", wavelengths_m=(1.5, 80.0))
+    (drawn,) = _irregularities(spectrum)
+    assert drawn == (
+        "irregularity",
+        "erri_b176_low",
+        "synthetic",
+        "random draw from the spectrum, wavelengths 1.5 to 80 m",
+    )
+    defect = {"form": "dip", "at_m": 120.0, "length_m": 6.0, "size_mm": 4.0, "rails": "left"}
+    dip = IrregularityPart.model_validate(
+        {"spectrum": "none", "defect": (defect | {"direction": "vertical"},)}
+    )
+    assert _irregularities(dip) == [
+        (
+            "defect",
+            "dip of 4 mm over 6 m at 120 m",
+            "synthetic",
+            "as the scenario says; left rails, vertical",
+        )
+    ]
+    (none,) = _irregularities(IrregularityPart(spectrum="none"))
+    assert none.name == "none"
+
+
+def test_the_manifest_is_told_in_words() -> None:
+    told = facts(
+        {"seed": 0, "cells": 12, "failed": 0, "warnings": [], "wall_s": 12.3456, "beside": "x"}
+        | {"versions": {"numpy": "2.1", "python": "3.11"}, "stop": {"told": "after 4 draws", "draws": 4}}
+    )
+    assert dict(told) == {
+        "seed": "0",
+        "cells": "12",
+        "failed": "0",
+        "stop rule": "after 4 draws",
+        "wall time, s": "12.3",
+        "versions": "numpy 2.1, python 3.11",
+    }
+
+
+def test_a_number_has_its_decimals_and_its_spread_as_many() -> None:
+    assert number_cell(1.23456) == Cell("1.235")
+    assert number_cell(-1.26, decimals=1, spread=0.349, mark="best") == Cell("\u22121.3", "0.3", "best")
+    assert number_cell(-0.0004) == Cell("0.000")
+    assert number_cell(float("nan"), spread=1.0) == number_cell(float("inf")) == NONE
+
+
+def test_behind_the_baseline_is_what_errs_more_than_no_imu() -> None:
+    """In the quantity and band that are asked of; an equal one is not behind, nor is the baseline."""
+    sizes = {"zero": 1.0, "better": 0.9, "equal": 1.0, "worse": 1.1, "worst": 9.0}
+    scores = {
+        (name, quantity, band, "truth", "whole", "sd"): Mean(size if band == "D1" else 1.0 / size, 0.0, 2)
+        for name, size in sizes.items()
+        for quantity in ("vertical_profile", "cross_level")
+        for band in ("D1", "full")
+    }
+    case = Case({}, pd.DataFrame({"draws": [2]}), scores)
+    styles = [
+        MethodStyle(name, name, "no IMU" if name == "zero" else "", name != "zero", "", None, "#000000", "-")
+        for name in sizes
+    ]
+    assert is_zero(styles[0]) and not any(map(is_zero, styles[1:]))
+    told = behind_baseline(case, styles, "cross_level", band="D1")
+    assert [style.name for style in told] == ["worse", "worst"]
+    told = behind_baseline(case, styles, "cross_level", band="full")
+    assert [style.name for style in told] == ["better"]
+    assert behind_baseline(case, styles[1:], "cross_level", band="D1") == []

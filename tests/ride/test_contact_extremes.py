@@ -92,6 +92,18 @@ def test_extremes_of_the_rows_themselves(bogie):
     assert "longest_without_load_s" not in said
 
 
+def test_wheels_that_press_against_each_other_leave_their_axle_the_rest(bogie):
+    """Rails push with 8 kN to the right and 5 kN to the left, and leave 3 kN; behind, 1 and 2 to the left."""
+    place = np.arange(1000) * 0.01
+    told = told_of(place, np.full((1000, 4), 40e3), np.tile([-8e3, 5e3, 1e3, 2e3], (1000, 1)))
+    said, _ = summary(bogie, np.arange(1000) / RATE_HZ, told)
+    for name in ("greatest_sum_y_n", "greatest_sum_y_2m_n"):
+        assert said[name]["value"] == pytest.approx(3e3, rel=1e-12)
+    # The left wheel of the first axle presses its rail outward the most for its load: 8 in 40.
+    assert said["greatest_y_over_q_2m"]["value"] == pytest.approx(0.2, rel=1e-12)
+    assert said["greatest_y_over_q_2m"]["name"] == bogie.wheel_names[0]
+
+
 def test_sliding_means_over_two_metres(bogie):
     """Every 0.1 m, by an integral of its own: rests and the way back included."""
     time_s, told = ride()

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from simrail.core.columns import ATTITUDE, IMU, MOTION
+from simrail.core.columns import ATTITUDE, IMU, MOTION, RELATIVE_ATTITUDE
 from simrail.core.rotation import rotation_matrix
 from simrail.core.toml_files import load
 from simrail.ride import mount_motion
@@ -52,6 +52,13 @@ def test_a_turned_sensor_has_the_attitude_and_the_signals_of_its_axes(truth: Tru
     # No jump of a turn, though the yaw passes half a turn on the way.
     assert np.abs(np.diff(turned["yaw_rad"])).max() < 1e-3 and np.ptp(turned["yaw_rad"]) > 0.3
     assert turned["yaw_rad"].max() > np.pi
+
+
+def test_a_sensor_that_faces_back_has_one_yaw_over_the_track(truth: Truth) -> None:
+    """Half a turn beside the track's, either side of it: never minus half a turn."""
+    for yaw in (np.pi, -np.pi):
+        beside = truth.motion(replace(STRAIGHT, yaw_rad=yaw), columns=RELATIVE_ATTITUDE).to_numpy()
+        np.testing.assert_allclose(beside[:, 2], yaw, atol=0.01)
 
 
 def test_a_motion_is_worked_out_once(truth: Truth, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -173,6 +173,24 @@ def test_a_ride_that_is_found_again_is_not_the_one_to_go(ride, own_cache, monkey
     assert [is_cached(one) for one in rides] == [True, False, True]
 
 
+def test_the_same_ride_of_a_faster_process_stays_and_a_fault_of_the_disk_is_raised(own_cache, monkeypatch):
+    with ride_cache.new_ride("fast") as draft:
+        draft.mkdir(parents=True)
+        (draft / "body").write_text("mine")
+        (own_cache / "fast").mkdir()
+        (own_cache / "fast" / "body").write_text("theirs")
+    assert (own_cache / "fast" / "body").read_text() == "theirs"
+
+    def broken(self, target):
+        raise OSError(5, "Input/output error")
+
+    monkeypatch.setattr(type(own_cache), "replace", broken)
+    with pytest.raises(OSError, match="Input/output"), ride_cache.new_ride("slow") as draft:
+        draft.mkdir()
+        (draft / "body").write_text("mine")
+    assert [one.name for one in own_cache.iterdir()] == ["fast"], "no draft is left"
+
+
 def test_clear_frees_everything(ride):
     simulate(ride)
     size = sum(found.size_bytes for found in ride_cache.rides())
@@ -268,7 +286,10 @@ def test_extremes_of_a_ride_are_those_of_its_rows(driven):
     said = truth.manifest["contact"]
     assert said["greatest_q_n"]["value"] == load.max()
     assert said["smallest_q_over_q0"]["value"] == (load / driven.vehicle.wheel_load_n(9.81)).min()
-    assert truth.manifest["warnings"] == []
+    manifest = truth.manifest
+    assert manifest["warnings"] == [] and manifest["setup_s"] > 0.0
+    assert manifest["simulated_s"] == pytest.approx(truth.time_s[-1], abs=1e-9)
+    assert manifest["real_time_factor"] == manifest["simulated_s"] / manifest["wall_s"]
 
 
 def test_contact_that_was_not_kept_is_said_with_the_remedy(ride):

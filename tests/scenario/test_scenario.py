@@ -422,3 +422,9 @@ def test_warnings_that_differ_by_numbers_are_told_once() -> None:
     )
     (told,) = [one for one in plan.warnings if "uncompensated" in one]
     assert told.endswith("(and 3 more like it)") and "78 km/h" in told
+
+
+@pytest.mark.parametrize("name", ["full", "D0", "D1", "D2", "D3"])
+def test_no_band_of_ones_own_takes_the_name_of_another(name: str) -> None:
+    with pytest.raises(InputError, match="name that is taken"):
+        load_scenario("quick_kinematic", overrides=[f"geometry.own_bands={{{name}=[3.0, 30.0]}}"])

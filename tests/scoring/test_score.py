@@ -29,6 +29,7 @@ from simrail.scoring.table import (
     OK,
     QUANTITY_UNITS,
     SCORE_COLUMNS,
+    _categorical,
     as_score_table,
     concat_scores,
     failed_figures,
@@ -700,3 +701,14 @@ def test_ten_estimates_of_a_hundred_thousand_samples_take_well_under_two_seconds
     for _ in range(10):
         score(estimate, reference, recording)
     assert time.process_time() - begun < 2.0
+
+
+def test_words_of_curves_are_windows_and_nothing_else() -> None:
+    assert list(_categorical("window", ["curve:12", "whole"], ())) == ["curve:12", "whole"]
+    for name in ("metric", "quantity", "band", "reference", "unit"):
+        with pytest.raises(ValueError, match="not in the vocabulary"):
+            _categorical(name, ["curve:12"], ())
+    assert list(_categorical("band", ["mine"], ("mine",))) == ["mine"]
+    with pytest.raises(ValueError, match="not in the vocabulary"):
+        _categorical("band", ["mine"], ())
+    assert list(_categorical("estimator", ["curve:12"], ())) == ["curve:12"]

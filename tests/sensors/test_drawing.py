@@ -1,6 +1,7 @@
 """Drawings of simulated vehicles against figures worked out by hand from their files, and against rides."""
 
 from dataclasses import astuple, replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from simrail.recording.sheets.vehicle_sheet import Support
 from simrail.ride.ride import Ride, simulate
 from simrail.ride.truth import Truth
 from simrail.scenario.build import NO_IRREGULARITY
-from simrail.sensors.drawing import drawing
+from simrail.sensors.drawing import _bearings, drawing
 from simrail.track.design import Curve, Straight, TrackDesign, Transition
 from simrail.vehicle.file import VehicleFile
 from simrail.vehicle.model import Body, Rod, SeriesDamper, Suspension, VehicleModel
@@ -389,3 +390,20 @@ def test_a_frame_whose_axles_yaw_points_where_stiffness_turns_it() -> None:
         behind.append(RADIUS_M * float(np.mean(yaw - tangent)))
     assert np.mean(behind) == pytest.approx(chord.centre_m, abs=chord.play_m / 3.0)
     assert abs(chord.centre_m) > 5.0
+
+
+def test_a_rod_bears_by_its_rise_and_a_damper_where_it_is_upright() -> None:
+    """A rod of 1 m that rises by 0.6 m: 0.6 of its tension, 0.36 of its stiffness and of its damping."""
+    rod = Rod("rod", "low", "high", (0.0, 0.0, 1.0), (0.8, 0.0, 1.6), 1e6, 1e4)
+    dampers = tuple(
+        SeriesDamper(str(axis), "low", "high", (2.0, 0.0, 1.0), axis, 1e6, 5e3) for axis in (0, 1, 2)
+    )
+    vehicle = SimpleNamespace(
+        suspensions=(), series=dampers, rods=(rod,), preload_n=lambda _: (), rod_tension_n=lambda _: (100.0,)
+    )
+    *beside, bearing = _bearings(vehicle)  # type: ignore[arg-type]
+    assert bearing.x_m == {"low": 0.0, "high": 0.8}
+    assert bearing.load_n == pytest.approx({"low": 60.0, "high": -60.0})
+    assert tuple(bearing)[2:4] == pytest.approx((0.36e6, 0.36e4))
+    assert [tuple(one)[2:4] for one in beside] == [(0.0, 0.0), (0.0, 0.0), (0.0, 5e3)]
+    assert all(one.x_m == {"low": 2.0, "high": 2.0} for one in beside)

@@ -62,6 +62,16 @@ def test_field_turns_with_the_body_as_scipy_says():
     np.testing.assert_allclose(field.to_numpy(), expected, rtol=0, atol=1e-18)
 
 
+def test_soft_iron_takes_the_field_of_one_axis_to_another():
+    """Its row is what is felt, its column what is there: b = (1 + M) b0, by hand for one entry."""
+    iron = VehicleIron((0.0, 0.0, 0.0), ((0.0, 0.1, 0.0), (0.0, 0.0, 0.0), (0.0, -0.2, 0.0)))
+    bare = sample(motion(yaw_rad=0.4), QUIET).to_numpy()
+    felt = sample(motion(yaw_rad=0.4), replace(QUIET, iron=iron)).to_numpy()
+    along = bare[:, 1]
+    expected = bare + np.column_stack([0.1 * along, np.zeros_like(along), -0.2 * along])
+    np.testing.assert_allclose(felt, expected, rtol=0, atol=1e-18)
+
+
 def test_hard_iron_moves_the_circle_and_soft_iron_makes_it_an_ellipse():
     yaw = 2.0 * np.pi * np.arange(len(TIMES)) / len(TIMES)
     hard, soft = (6e-6, -4e-6, 8e-6), ((0.1, 0.03, 0.0), (0.03, -0.2, 0.0), (0.0, 0.0, 0.05))

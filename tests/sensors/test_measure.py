@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from simrail.core.columns import IMU, ODOMETRY, ODOMETRY_SD
+from simrail.core.columns import IMU, MAGNETIC, ODOMETRY, ODOMETRY_SD
 from simrail.core.errors import InputError
 from simrail.estimation.choose_odometry import with_odometry
 from simrail.estimation.recorded_ride import read_ride
@@ -20,8 +20,10 @@ from simrail.ride.truth import Mount
 from simrail.sensors.encoder import EncoderSpec, Slip
 from simrail.sensors.imu import EarthRate, streams_of
 from simrail.sensors.imu_response import Temperature
+from simrail.sensors.magnetic_surroundings import Steel
 from simrail.sensors.magnetometer import MagnetometerSpec
 from simrail.sensors.measure import measure
+from simrail.sensors.second_imu import SecondImuSpec
 from simrail.track.design import Straight, TrackDesign
 from simrail.vehicle.speed_profile import Run, SpeedProfile
 
@@ -230,6 +232,33 @@ def test_temperature_acts_only_if_given(truth):
     pd.testing.assert_frame_equal(cold.imu, record(truth).imu, check_exact=True)
     warm = record(truth, grade=grade, temperature=Temperature(45.0, 45.0))
     assert np.abs(warm.imu["gyro_x_radps"] - cold.imu["gyro_x_radps"]).mean() > 1e-5
+
+
+def test_a_second_imu_is_as_warm_and_on_the_same_earth(truth):
+    """Of a coefficient and a gyro without noise all of the difference is theirs, sample by sample."""
+    grade = replace(load_grade("ideal"), gyro_bias_temperature_radpspk=1e-4)
+    rear = SecondImuSpec(Mount("rear", "body", (-8.0, 0.0, 0.6)), grade)
+    earth = EarthRate(0.9, 0.5)
+    for change in ({"temperature": Temperature(45.0, 45.0)}, {"earth_rate": earth}):
+        plain, changed = (record(truth, grade=grade, second_imu=rear, **more) for more in ({}, change))
+        for name in ("gyro_x_radps", "gyro_z_radps"):
+            first = (changed.imu[name] - plain.imu[name]).to_numpy()
+            second = (changed.second_imu[name] - plain.second_imu[name]).to_numpy()
+            assert np.abs(first).min() > 1e-6 and np.abs(second).min() > 1e-6
+            if "earth_rate" in change:
+                np.testing.assert_allclose(second[:1000], first[:1000], atol=1e-9)
+
+
+def test_steel_stands_along_the_whole_track_wherever_it_begins(truth, monkeypatch):
+    asked = {}
+
+    def sample(motion, times, spec, **more):
+        asked.update(more)
+        return pd.DataFrame(0.0, index=times, columns=list(MAGNETIC))
+
+    monkeypatch.setattr("simrail.sensors.measure.sample_magnetometer", sample)
+    record(truth, magnetometer=MagnetometerSpec(steel=Steel(5)))
+    assert asked == {"track_m": (-50.0, 550.0), "seed": 2, "draw": 0, "name": "axle"}
 
 
 def test_rest_is_found_from_the_encoder(truth):

@@ -12,8 +12,10 @@ import pytest
 from scipy.integrate import quad
 
 from simrail.cli.main import call
+from simrail.cli.templates import write_track
 from simrail.core.errors import InputError
 from simrail.core.jit import FloatArray
+from simrail.core.toml_files import read_toml
 from simrail.track.curvature_csv import read_curvature_csv
 from simrail.track.design import Curve, TrackDesign, Transition
 from simrail.track.file import track_by_name
@@ -358,6 +360,24 @@ def test_the_command_writes_a_track_that_reads_back(
     judge(track_by_name(str(tmp_path / "line.toml")), heading=HEADING)
     assert call(["new", "vehicle", "v", "--from", str(source), "--in", str(tmp_path)]) == 2
     assert "belongs to a track" in capsys.readouterr().err
+
+
+def test_a_track_has_the_name_that_is_asked_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Not that of the line it comes from, or two of one export were one; what is asked is handed on."""
+    asked: dict[str, object] = {}
+
+    def read(path: Path, **more: object) -> tuple[TrackDesign, list[str]]:
+        asked.update(more, path=path)
+        return TrackDesign("of the export", 0.0, (Curve(90.0, 300.0),)), ["a note"]
+
+    monkeypatch.setattr("simrail.track.foreign_file.design_from_file", read)
+    source = tmp_path / "export.xml"
+    path, notes = write_track("siding", source, folder=tmp_path, alignment="two", step_smoothing_m=6.0)
+    assert asked == {"path": source, "alignment": "two", "step_smoothing_m": 6.0}
+    assert path == tmp_path / "siding.toml" and notes == ["a note"]
+    head = read_toml(path)
+    assert (head["name"], head["title"]) == ("siding", "Track siding")
+    assert path.read_text(encoding="utf-8").startswith("# a note\n")
 
 
 def test_rows_on_a_line_make_one_piece(tmp_path: Path) -> None:

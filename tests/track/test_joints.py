@@ -184,9 +184,13 @@ def test_ends_of_which_nothing_says_enough(elements: tuple[object, ...], field: 
     assert caught.value.field == field
 
 
-def test_a_step_at_the_very_end_cannot_be_smoothed() -> None:
-    with pytest.raises(InputError, match="too close to an end"):
-        TrackDesign("bad", 0.0, (Straight(2.0), Curve(9.0, 300.0)), step_smoothing_m=5.0).check()
+@pytest.mark.parametrize("ways", [slice(None), slice(None, None, -1)], ids=["start", "end"])
+def test_a_step_at_the_very_end_cannot_be_smoothed(ways: slice) -> None:
+    line = (Straight(2.4), Curve(9.0, 300.0))[ways]
+    with pytest.raises(InputError, match="too close to an end") as caught:
+        TrackDesign("bad", 0.0, line, step_smoothing_m=5.0).check()
+    assert caught.value.value == "2.4 m from the end" and caught.value.field == "segment[1]"
+    TrackDesign("good", 0.0, line, step_smoothing_m=4.8).check()
 
 
 @pytest.mark.parametrize("name", LINES)

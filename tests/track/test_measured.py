@@ -189,6 +189,16 @@ def test_gaps_are_bridged_on_request_by_smooth_steps() -> None:
         measured(s[kept], rails(s)[kept], bridge_gaps_m=2.4)
 
 
+def test_what_a_gap_is_told_to_need_bridges_it() -> None:
+    """From 99.75 to 102.5 m: the advice is rounded to what bridges it, not to what does not."""
+    s = np.arange(0.0, 600.25, 0.25)
+    kept = (s < 100.0) | (s > 102.25)
+    with pytest.raises(InputError, match="has a gap") as caught:
+        measured(s[kept], rails(s)[kept])
+    assert "2.75 m after" in str(caught.value) and "bridge_gaps_m = 2.8" in str(caught.value)
+    assert measured(s[kept], rails(s)[kept], bridge_gaps_m=2.8).position_m == pytest.approx(s, abs=1e-12)
+
+
 def test_the_digest_covers_places_and_values_not_the_name() -> None:
     s = STEPS["0.25 m"]
     one = measured(s)

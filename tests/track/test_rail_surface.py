@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
+from simrail.core.seeds import stream
 from simrail.core.toml_files import load
 from simrail.track.file import TrackFile
 from simrail.track.rail_surface import (
@@ -157,6 +158,21 @@ def test_sections_have_the_gain_that_is_told():
     assert lengths.max() <= 405.0
 
 
+def test_a_section_passes_into_the_next_about_where_they_meet():
+    """Sections of just 100 m: their own scores in the middle, a quintic step over 20 m about the meeting."""
+    drawn = stream(7, "track", "sections")
+    own = np.array([(drawn.uniform(100.0, 100.0), drawn.standard_normal())[1] for _ in range(4)])
+    s = 50.0 + np.array([0.0, 89.9, 95.0, 100.0, 105.0, 110.1, 189.9, 200.0, 295.0, 350.0])
+    # u = 1/4: u^3 (10 - 15 u + 6 u^2) = (10 - 3.75 + 0.375) / 64
+    quarter = 6.625 / 64.0
+    u = np.array([0.0, 0.0, quarter, 0.5, 1.0 - quarter, 1.0, 0.0, 0.5, quarter, 0.0])
+    first = np.array([0, 0, 0, 0, 0, 0, 1, 1, 2, 3])
+    beyond = np.append(own[1:], 0.0)
+    expected = own[first] + (beyond[first] - own[first]) * u
+    scores = section_scores(s, (100.0, 100.0), start_m=50.0, seed=7)
+    np.testing.assert_allclose(scores, expected, atol=1e-12)
+
+
 def test_sections_do_not_depend_on_the_length_of_the_line():
     s = np.arange(0.0, 1000.0, 1.0)
     short = section_scores(s, (100.0, 400.0), start_m=0.0, seed=7)
@@ -168,6 +184,14 @@ def test_roughness_follows_its_sections(line):
     plain = RailSources(roughness=Roughness(M))
     gained = RailSources(roughness=Roughness(M), section_gain=SectionGain(0.4))
     s = np.arange(0.0, 2000.0, 0.05)
-    ratio = lay_surface(gained, line, seed=3).height(0, s) / lay_surface(plain, line, seed=3).height(0, s)
+    surfaces = [lay_surface(one, line, seed=3) for one in (plain, gained)]
+    bare, full = (surface.height(0, s) for surface in surfaces)
+    ratio = full / bare
     expected = section_gain(s, SectionGain(0.4), start_m=line.start_m, seed=3)
     assert np.median(np.abs(ratio / expected - 1.0)) < 1e-3
+    # Where heights are given, between sections too, it is the gain to rounding: an eighth of a metre shows.
+    s = STEP_M * np.arange(0, 256_000, 7)
+    bare, full = (surface.height(0, s) for surface in surfaces)
+    expected = section_gain(s, SectionGain(0.4), start_m=line.start_m, seed=3)
+    np.testing.assert_allclose(full, expected * bare, rtol=0.0, atol=1e-9 * np.abs(bare).max())
+    assert np.abs(np.diff(expected)).max() > 1e-4

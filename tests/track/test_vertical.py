@@ -37,6 +37,16 @@ def test_vertical_curve_keeps_the_change_of_slope_exact(ramp: float, change: flo
     assert steps == pytest.approx(1.0 / radius, rel=1e-3) if not ramp else steps < 2e-3 / ramp / radius
 
 
+def test_every_gradient_has_its_own_slope() -> None:
+    """Three changes: each counts from the gradient before it, with a gradient at the start and without."""
+    slopes, places = (0.004, -0.01, 0.02, 0.005), (0.0, 200.0, 400.0, 600.0)
+    gradients = tuple(Gradient(place, slope) for place, slope in zip(places, slopes, strict=True))
+    for given, first in ((gradients, 0.004), (gradients[1:], 0.0)):
+        design = TrackDesign("three", 0.0, (Straight(800.0),), gradients=given)
+        frame = design.frame(np.array([100.0, 300.0, 500.0, 700.0]))
+        assert -np.tan(frame.pitch_rad) == pytest.approx([first, *slopes[1:]], abs=1e-15)
+
+
 def test_parabola_stands_where_it_should() -> None:
     design = TrackDesign(
         "parabola", 0.0, (Straight(300.0),), gradients=(Gradient(100.0, 0.03),), vertical_ramp_m=0.0

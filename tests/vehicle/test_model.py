@@ -236,3 +236,12 @@ def test_creep_law_of_the_file_reaches_the_contact():
     )
     assert (plain["creep_law"], polach["creep_law"]) == (0.0, 1.0)
     assert polach["polach_slip"] == 0.4
+
+
+def test_a_vehicle_shows_its_whole_mass_and_every_radius_of_its_wheels() -> None:
+    """A body of 32 t, two frames of 2615 kg, four wheelsets of 613 and two wheels of 600 kg."""
+    model = load(VehicleFile, "vehicle", "manchester_1").model("manchester_1")
+    name, facts = model._facts()
+    assert name == "manchester_1" and facts["mass"] == "44,482 kg"
+    assert facts["wheels"] == "8 of 0.46 m radius"
+    assert str(facts["is"]).startswith("synthetic: ") == model.synthetic

@@ -184,6 +184,13 @@ def judged(paper: Paper, evidence: object, judges: ModuleType, *, has: Callable[
     return claims
 
 
+def title_of(paper: Paper, claims: Sequence[Claim]) -> str:
+    """Title of the section beside a paper, which is folded: it says how many claims were reproduced."""
+    asked = [claim.verdict for claim in claims if claim.verdict != "not asked"]
+    count = f": {asked.count('reproduced')} of {len(asked)} claims reproduced" if asked else ""
+    return f"Beside {paper.heading}{count}"
+
+
 def with_ablation(claims: Sequence[Claim], of_twins: Sequence[Claim], ablation: Ablation) -> list[Claim]:
     """Claims that say what became of them in an ablation: figures, and verdict if another.
 

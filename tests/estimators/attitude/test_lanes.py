@@ -13,8 +13,6 @@ from simrail.estimators.attitude.lanes import LANES, LEAST, by_lanes
 
 from simrail.recording.recording import Recording, beginning
 
-pytestmark = pytest.mark.long  # the loops take some seconds to compile
-
 METHODS = [
     AttitudeEkf(),
     AttitudeEkf(compensated=False, tuning="paper_final", doubt=0.5),
@@ -43,6 +41,7 @@ def drawn() -> Callable[[Recording, int], list[Recording]]:
     return draw
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("method", METHODS, ids=["ekf", "ekf_printed_noise", "gda", "gda_uncompensated"])
 @pytest.mark.parametrize("count", [1, LEAST, LANES, LANES + 1])
 def test_each_has_the_bits_that_it_has_by_itself(
@@ -62,6 +61,7 @@ def test_each_has_the_bits_that_it_has_by_itself(
             np.testing.assert_array_equal(many.innovations.to_numpy(), alone.innovations.to_numpy())
 
 
+@pytest.mark.long
 def test_what_has_no_number_stays_in_its_lane(noisy: Recording, drawn: Callable) -> None:
     method, recordings = AttitudeEkf(), drawn(beginning(noisy, samples=600), LEAST)
     recordings[2].imu.iloc[300, 4] = np.nan
@@ -70,6 +70,7 @@ def test_what_has_no_number_stays_in_its_lane(noisy: Recording, drawn: Callable)
     assert finite == [i != 2 for i in range(LEAST)]
 
 
+@pytest.mark.long
 def test_loops_are_shared_by_those_that_are_alike(noisy: Recording) -> None:
     short, long = beginning(noisy, samples=10), beginning(noisy, samples=20)
     heavy = replace(long, gravity_mps2=9.83)
@@ -78,3 +79,45 @@ def test_loops_are_shared_by_those_that_are_alike(noisy: Recording) -> None:
     assert alone == [0, 1, 2]
     assert [len(part) for part in shared] == [LANES, LEAST, LEAST]
     assert sorted(i for part in shared for i in part) == list(range(3, len(recordings)))
+
+
+class HandedOn(Exception):
+    """What a method hands the loop, without the loop."""
+
+
+@pytest.mark.parametrize(
+    ("method", "module"),
+    [(AttitudeEkf(), "ekf"), (AttitudeEkf(doubt=0.5), "ekf"), (AttitudeGda(), "gda")],
+    ids=["ekf", "ekf_doubt", "gda"],
+)
+def test_each_lane_is_handed_what_is_its_own(
+    method: AttitudeEkf | AttitudeGda,
+    module: str,
+    noisy: Recording,
+    drawn: Callable,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Signals and noises in the order of the recordings, each those of the method alone."""
+    recordings = drawn(beginning(noisy, samples=600), LEAST)
+    recordings = [replace(one, imu=one.imu * (1.0 + 0.1 * i)) for i, one in enumerate(recordings)]
+
+    def through(_block: object, _lanes: object, given: list, _rooms: object) -> None:
+        raise HandedOn(given)
+
+    place = f"simrail.estimators.attitude.{module}"
+    monkeypatch.setattr(f"{place}.through", through)
+    monkeypatch.setattr("simrail.estimators.attitude.ekf.begin_ekf", lambda *_: None)
+    with pytest.raises(HandedOn) as caught:
+        method.estimate_many(recordings)
+    (given,) = caught.value.args
+    assert len(given) == len(recordings)
+    for one, handed in zip(recordings, given, strict=True):
+        own = method._arrays(one)
+        if isinstance(method, AttitudeEkf):
+            arrays = own[0]
+            expected = (arrays.rate, arrays.force, arrays.noise, arrays.process[:, None])
+        else:
+            expected = own[:2]
+        assert len(handed) == len(expected)
+        for array, alone in zip(handed, expected, strict=True):
+            np.testing.assert_array_equal(array, alone)

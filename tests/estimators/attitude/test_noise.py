@@ -44,6 +44,31 @@ def test_time_constant_minimises_the_error(sensor: float, swing: float, bias: fl
     assert abs(residual) < 1e-9 * (white + 4 * bias * tau)
 
 
+def test_time_constant_of_a_sample_does_not_depend_on_the_others() -> None:
+    """Those that are found at once stop each by itself, however far apart they are."""
+    rng = np.random.default_rng(3)
+    swing, bias = 10.0 ** rng.uniform(-9.0, 0.0, 200), 10.0 ** rng.uniform(-12.0, -6.0, 200)
+    whole = time_constant(1e-6, swing, 8e-9, bias, gravity=GRAVITY)
+    for i in range(0, 200, 7):
+        alone = time_constant(1e-6, swing[i : i + 1], 8e-9, bias[i : i + 1], gravity=GRAVITY)
+        assert alone[0] == whole[i]
+
+
+def test_noise_follows_a_speed_that_jumps(recording: Recording) -> None:
+    """From one time constant to another that is nowhere near: each is as if it had been the first."""
+    speed = recording.odometry["speed_mps"].to_numpy().copy()
+    speed[3000:3100] = 0.0
+    speed[3050] = 80.0
+    jumps = replace(recording, odometry=recording.odometry.assign(speed_mps=speed))
+    rest, sheet = rest_bias(recording), recording.imu_sheet
+    found = recommended_noise(jumps, rest, curves=None)
+    white = sheet.gyro_noise_radpsqrts**2 + 1e-10
+    sensor = sheet.accel_noise_mpsqrts**2 + 1e-6 / 250.0
+    bias = bias_variance(sheet, rest.samples / 250.0)
+    tau = time_constant(sensor, (2e-3 * speed) ** 2, white, bias, gravity=GRAVITY)
+    np.testing.assert_allclose(found.process, (white + 4.0 * bias * tau) / 250.0, rtol=1e-12)
+
+
 def curves_of(recording: Recording) -> np.ndarray:
     """What the compensation of a recording is made of."""
     return gravity_and_curves(recording, compensated=True).curves

@@ -5,11 +5,12 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 from functools import lru_cache
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
 import pytest
-from simrail.estimators.odometry.bogie_delay import BogieDelayOdometry
+from simrail.estimators.odometry.bogie_delay import SURE, BogieDelayOdometry, _judge_spacing
 from simrail.estimators.odometry.bogie_delay_kernel import is_borne_out, room_to_hear, search_delay
 from simrail.estimators.odometry.zero_velocity import ZeroVelocityOdometry
 from simrail.estimators.odometry.zero_velocity_kernel import OFFSET, SCALE, SPACING, V
@@ -26,8 +27,6 @@ from simrail.ride.truth import Mount, Truth
 from simrail.sensors.measure import measure
 from simrail.track.file import track_by_name
 from simrail.vehicle.speed_profile import Run, SpeedProfile
-
-pytestmark = pytest.mark.long  # Its kernels take ten seconds to compile.
 
 SPACING_M = 15.0
 
@@ -91,10 +90,12 @@ def compared(recording: Recording, profile: SpeedProfile = THERE_AND_BACK, **opt
     return states.assign(true_mps=motion["speed_mps"], true_m=motion["position_m"])
 
 
+@pytest.mark.long
 def test_it_is_registered() -> None:
     assert registered()["BogieDelayOdometry"].load() is BogieDelayOdometry
 
 
+@pytest.mark.long
 def test_speed_there_and_back_and_a_planted_clock_offset() -> None:
     """.06 m/s causal with a clock 31 ms ahead, twice as good as without the second IMU.
 
@@ -119,6 +120,7 @@ def test_speed_there_and_back_and_a_planted_clock_offset() -> None:
         assert trace.found.states[-1, OFFSET] == pytest.approx(0.031, abs=0.004)
 
 
+@pytest.mark.long
 def test_a_clock_that_is_far_off_is_searched_as_such_while_the_train_sets_off() -> None:
     """47 ms: no one addition to the speed has both ends of a window right at .9 m/s2, an offset has.
 
@@ -144,6 +146,7 @@ def test_a_clock_that_is_far_off_is_searched_as_such_while_the_train_sets_off() 
     assert trace.found.states[first, OFFSET] == pytest.approx(-0.047, abs=0.01)
 
 
+@pytest.mark.long
 def test_a_frame_follows_what_its_wheels_run_over() -> None:
     """Told 6 ms less than the 12 ms by which it does, a search is off by 6 ms times the acceleration."""
     recording = recorded()
@@ -163,6 +166,7 @@ def test_a_frame_follows_what_its_wheels_run_over() -> None:
     assert wrong - right == pytest.approx(-0.006 * 0.9, rel=0.2)
 
 
+@pytest.mark.long
 def test_one_delay_alone_is_not_believed() -> None:
     """Before the clocks' offset is known: another search, in other samples, must tell the same."""
     recording = recorded()
@@ -185,6 +189,7 @@ def test_one_delay_alone_is_not_believed() -> None:
     assert not is_borne_out(echo, heard, k, 0.1)  # more tell another
 
 
+@pytest.mark.long
 def test_a_second_imu_ahead_of_the_first_says_the_same() -> None:
     """Their parts changed: what was behind is ahead, its clock behind."""
     one = recorded(0.02)
@@ -203,6 +208,7 @@ def test_a_second_imu_ahead_of_the_first_says_the_same() -> None:
     assert trace.found.states[-1, OFFSET] == pytest.approx(-0.02, abs=0.006)
 
 
+@pytest.mark.long
 def test_a_wrong_spacing_is_refused_with_the_right_one() -> None:
     """1 and 3 % more than it is, told with an sd of 1 cm; with 1 m it is found, and speed is right."""
     for share in (0.01, 0.03):
@@ -223,6 +229,7 @@ def test_a_wrong_spacing_is_refused_with_the_right_one() -> None:
     assert trace.found.states[-1, SPACING] == pytest.approx(-0.03 * SPACING_M, abs=0.06)
 
 
+@pytest.mark.long
 def test_the_row_is_the_derivative_of_the_search() -> None:
     """c changes by V^2/L per second of the clock, V/L per metre of the distance, an age by push."""
     recording, method = recorded(), BogieDelayOdometry()
@@ -252,6 +259,7 @@ def test_the_row_is_the_derivative_of_the_search() -> None:
         assert by_push == pytest.approx(age, rel=0.1)
 
 
+@pytest.mark.long
 def test_it_passes_the_battery() -> None:
     """Nothing later enters, by either clock; backwards, at rest and without what it does not need."""
     short = SpeedProfile(
@@ -268,12 +276,14 @@ def test_it_passes_the_battery() -> None:
     pd.testing.assert_frame_equal(whole.iloc[:3000], part, check_exact=True)
 
 
+@pytest.mark.long
 def test_without_a_second_imu_it_is_refused() -> None:
     recording = recorded()
     with pytest.raises(InputError, match="no second IMU"):
         BogieDelayOdometry().estimate(replace(recording, second_imu=None, second_imu_sheet=None))
 
 
+@pytest.mark.long
 def test_other_rates_nearness_and_slow_recording_are_refused() -> None:
     recording = recorded()
     sheet = recording.second_imu_sheet
@@ -298,6 +308,7 @@ def test_other_rates_nearness_and_slow_recording_are_refused() -> None:
             BogieDelayOdometry(**options)  # type: ignore[arg-type]
 
 
+@pytest.mark.long
 def test_the_scale_of_the_accelerometer_is_found() -> None:
     """1 % too little: no stop tells it, and without its state clock and distance would take it for theirs.
 
@@ -315,6 +326,7 @@ def test_the_scale_of_the_accelerometer_is_found() -> None:
     assert (off < 1.96 * found["speed_sd_mps"])[found["true_mps"].abs() > 1e-3].mean() > 0.75
 
 
+@pytest.mark.long
 def test_rails_that_two_bogies_do_not_feel_alike_do_no_harm() -> None:
     """Without an echo it is the zero-velocity odometry, but for chance."""
     recording = recorded()
@@ -325,3 +337,23 @@ def test_rails_that_two_bogies_do_not_feel_alike_do_no_harm() -> None:
     alone = ZeroVelocityOdometry().trace(recording)
     assert trace.heard is not None and (trace.heard.searches[:, 0] == 1.0).sum() == 0
     np.testing.assert_allclose(trace.found.states[:, V], alone.found.states[:, V], atol=1e-9)
+
+
+def learnt(metres: float, before_sd: float, after_sd: float) -> SimpleNamespace:
+    """A trace whose filter found the spacing so much longer than told, and how sure it is of it."""
+    states, last = np.zeros((3, SPACING + 1)), np.zeros((SPACING + 1, SPACING + 1))
+    states[-1, SPACING], last[SPACING, SPACING] = metres, after_sd**2
+    return SimpleNamespace(found=SimpleNamespace(states=states), last=last)
+
+
+def test_the_spacing_that_is_told_is_that_of_the_ride_alone() -> None:
+    """Told with 0.1 m and learnt to 0.06 m: the ride alone knows it to 0.06 / 0.8, and moves by 1 / 0.64."""
+    sheet = SimpleNamespace(spacing_m=20.0, spacing_sd_m=0.1)
+    with pytest.raises(InputError) as caught:
+        _judge_spacing(learnt(0.64, 0.1, 0.06), sheet)  # type: ignore[arg-type]
+    assert caught.value.limit == "21 m to 0.15 m" and caught.value.value == 20.0
+    # What it learns has a standard deviation of 0.08 m before: SURE of them are no contradiction.
+    _judge_spacing(learnt(0.99 * SURE * 0.08, 0.1, 0.06), sheet)  # type: ignore[arg-type]
+    with pytest.raises(InputError):
+        _judge_spacing(learnt(-1.01 * SURE * 0.08, 0.1, 0.06), sheet)  # type: ignore[arg-type]
+    _judge_spacing(learnt(9.0, 0.1, 0.1), sheet)  # type: ignore[arg-type]

@@ -69,6 +69,15 @@ def test_elements_and_curves_are_counted():
     assert [at(s).curve for s in (10.0, 340.0, 349.0, 600.0)] == [0, 0, 1, 1]
 
 
+def test_elements_and_curves_are_those_under_the_middle_of_the_chord():
+    """It is 5 m ahead of the mount: the joint at 300 m and the parting at 345 m are met 5 m earlier."""
+    chord = Chord(7.0, 9.0, 1.0, 0.0)
+    lines = [at(s, chord, 2.0) for s in (294.0, 296.0, 339.0, 341.0)]
+    assert [line.element for line in lines] == [3, 4, 4, 4]
+    assert [line.curve for line in lines] == [0, 0, 0, 1]
+    assert at(2.0, chord, 9.0).element == 0 and at(598.0, chord, 2.0).element == 8
+
+
 @pytest.mark.parametrize("kind", ["radius_relative_sd", "place_sd_m"])
 def test_errors_of_the_map_in_the_heading(kind: str):
     """What a drawn map's heading lacks of the laid one is what the table says of its errors, to first order.

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pandas as pd
 import pytest
 from simrail.estimators.odometry.encoder import EncoderOdometry
 from simrail.estimators.odometry.moving_start import (
+    SPEED_SD_MPS,
     Shown,
     Start,
     reading_variance,
     shown_by,
     smoothed_back,
+    start_of,
     start_of_counts,
 )
 
@@ -30,6 +34,21 @@ def counted(way: np.ndarray) -> np.ndarray:
 def test_a_train_at_speed_is_seen(speed: float) -> None:
     start = start_of_counts(TIME, counted(speed * TIME), PULSE)
     assert start.speed_mps == pytest.approx(speed, abs=0.1)
+
+
+@pytest.mark.parametrize("rate", [1.0, 2.0, 20.0])
+def test_a_slow_logger_shows_a_train_at_speed_as_well(rate: float) -> None:
+    """By its first reading that counts, a second after the first at most; the ride file's word goes first."""
+    time = np.arange(0.0, 6.0, 1.0 / rate)
+    counts = pd.DataFrame({"pulse_count": np.floor(9.0 * time / PULSE).astype(np.int64)}, index=time)
+    recording = SimpleNamespace(start_speed_mps=None, encoder=counts, encoder_sheet=SHEET)
+    start = start_of(recording)  # type: ignore[arg-type]
+    assert start.speed_mps == pytest.approx(9.0, abs=0.1) and start.sd_mps == SPEED_SD_MPS
+    for told in (0.0, -3.0):
+        recording.start_speed_mps = told
+        assert start_of(recording) == (Start(told, SPEED_SD_MPS) if told else Start())  # type: ignore[arg-type]
+    recording.start_speed_mps, recording.encoder = None, None
+    assert start_of(recording) == Start()  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("jerk", [0.0, 0.3, 1.4])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -12,6 +13,7 @@ import pytest
 from simrail.estimators.odometry.spectral import (
     HAMMING_BINS,
     RAYLEIGH,
+    Frames,
     SpectralOdometry,
     calibrate,
     frames_of,
@@ -200,3 +202,30 @@ def test_what_cannot_be_is_refused_in_one_line(shaking: Callable) -> None:
 def test_options_are_judged(options: dict) -> None:
     with pytest.raises(InputError):
         SpectralOdometry(**options)
+
+
+def test_the_intercept_is_that_of_the_first_rest_so_far(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Blocks of 4 samples at 100 Hz; frames of 4 blocks end with a block each: all four have to be quiet."""
+    quiet = np.array([False] * 2 + [True] * 8 + [False] * 5 + [True] * 9)
+    monkeypatch.setattr("simrail.estimators.odometry.spectral.quiet_of", lambda recording, block: quiet)
+    recording = SimpleNamespace(imu_sheet=SimpleNamespace(rate_hz=100.0))
+    ends = 4 * np.arange(4, 25) - 1
+    root = np.arange(21.0)
+    root[3] = np.nan  # a gap
+    method = SpectralOdometry(1.0, frame=16, hop=4)
+    found = method._root_at_rest(recording, Frames(ends, root))  # type: ignore[arg-type]
+    # Frames that end with blocks 6 to 10 lie in the first rest: numbers 2 to 6, but for the gap. The frame at
+    # the gap ends what counts.
+    assert np.isnan(found[:2]).all()
+    np.testing.assert_array_equal(found[2:], 2.0)
+
+
+def test_the_mean_over_a_rest_grows_with_its_frames(monkeypatch: pytest.MonkeyPatch) -> None:
+    quiet = np.array([False] * 2 + [True] * 8 + [False] * 5 + [True] * 9)
+    monkeypatch.setattr("simrail.estimators.odometry.spectral.quiet_of", lambda recording, block: quiet)
+    recording = SimpleNamespace(imu_sheet=SimpleNamespace(rate_hz=100.0))
+    frames = Frames(4 * np.arange(4, 25) - 1, np.arange(21.0))
+    found = SpectralOdometry(1.0, frame=16, hop=4)._root_at_rest(recording, frames)  # type: ignore[arg-type]
+    assert np.isnan(found[:2]).all()
+    np.testing.assert_array_equal(found[2:8], [2.0, 2.5, 3.0, 3.5, 4.0, 4.0])
+    np.testing.assert_array_equal(found[8:], 4.0)  # not of the second rest

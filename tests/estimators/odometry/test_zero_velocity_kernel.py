@@ -202,6 +202,33 @@ def test_a_train_that_crawls_turns(axis: int) -> None:
     assert (found.log_odds[:150] > math.log(99.0)).all()
 
 
+def test_that_nothing_shakes_is_said_once() -> None:
+    """A train runs by sensors that hide it: for 90 s it shakes no more than at rest, and its speed is lost.
+
+    All that is known is that it does not shake (2 to 1), and a speed of 3 +- 5 to 10 m/s among those to 40.
+    """
+    steps = 1000
+    runs = np.where(np.arange(steps) < 100, 0.0, -1.0)
+    process = ride_of(1).process.copy()
+    process[V] = 0.1
+    driven, shaking = np.zeros((steps, 5)), np.full(steps, math.log(2.0))
+    driven[:60, 3] = 0.5
+    shaking[60:100] = -20.0
+    found = judged(
+        np.zeros(1),
+        steps,
+        signals=driven,
+        shaking=shaking,
+        given=runs,
+        process=process,
+        rate_variance=1.0,
+        force_variance=100.0,
+    )
+    assert (found.covariances[100:, V, V] > 3.0**2).all()
+    most = PRIOR + math.log(2.0) + math.log(80.0 / (math.sqrt(2.0 * math.pi) * 3.0))
+    assert found.log_odds[100:].max() < most < math.log(99.0)
+
+
 def test_lost_samples_are_no_rest() -> None:
     shaking = np.full(200, math.log(2.0))
     shaking[150:] = -np.inf

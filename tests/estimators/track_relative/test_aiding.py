@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ import pandas as pd
 import pytest
 from simrail.estimators.track_relative import states as at
 from simrail.estimators.track_relative.aiding import (
+    ODOMETRY_S,
     Fixes,
     Odometer,
     OdometryPlace,
@@ -208,3 +210,21 @@ def test_bad_fixes_are_named(field: str, values: dict[str, Any]) -> None:
     with pytest.raises(InputError) as caught:
         Fixes(**(good | values))
     assert caught.value.field == field
+
+
+def test_a_way_is_as_sure_as_a_count_and_a_place_as_its_odometry() -> None:
+    """A count of 6 cm: 36 cm2 / 12. A place of 2 m, new every `ODOMETRY_S`, at each of its 4 ms: by hand."""
+    steps = SimpleNamespace(
+        way=np.array([0.0, 1.0, 2.0]),
+        slipping=np.array([False, True, False]),
+        resting=np.array([True, False, False]),
+        odometry=np.array([[10.0, 5.0, 0.0, 2.0], [11.0, 5.0, 0.0, 2.0], [12.0, 5.0, 0.0, 1.0]]),
+        dt=0.004,
+    )
+    recording = SimpleNamespace(encoder_sheet=SimpleNamespace(pulse_m=0.06))
+    wheel = WheelWay().rows(recording, steps)  # type: ignore[arg-type]
+    np.testing.assert_array_equal(wheel.values[:, 0], steps.way)
+    np.testing.assert_allclose(wheel.variances[:, 0], [3e-4, np.inf, 3e-4])
+    place = OdometryPlace().rows(recording, steps)  # type: ignore[arg-type]
+    np.testing.assert_array_equal(place.values[:, 0], [10.0, 11.0, 12.0])
+    np.testing.assert_allclose(place.variances[:, 0], np.array([np.inf, 4.0, 1.0]) * ODOMETRY_S / 0.004)

@@ -11,7 +11,16 @@ from simrail.estimators.track_relative import states as at
 from simrail.estimators.track_relative.aiding import WheelWay
 from simrail.estimators.track_relative.line import ground_at
 from simrail.estimators.track_relative.measurement import duals, shown
-from simrail.estimators.track_relative.model import _jerk, _sense, about, course_of, linearised, steps_of
+from simrail.estimators.track_relative.model import (
+    START_JERK_S,
+    Steps,
+    _jerk,
+    _sense,
+    about,
+    course_of,
+    linearised,
+    steps_of,
+)
 from simrail.estimators.track_relative.noise import AXLE, BODY
 from twins.track_relative import whole_rows
 
@@ -90,6 +99,14 @@ def test_the_linear_model_is_the_measurement_where_it_is_linearised(rough: Calla
     np.testing.assert_array_equal(
         whole_rows(model.columns, model.coefficients[0])[6], np.eye(at.STATES)[at.WAY]
     )
+
+
+def test_the_mount_stands_where_it_is_told(rough: Callable) -> None:
+    """Left of the middle and above the rails: y before z, and the lever along stays out of both."""
+    recording: Recording = replace(rough(), mount_position_m=(1.2, -0.3, 0.7))
+    course = course_of(recording, steps_of(recording, 25.0), BODY, (), ())
+    assert course.around.nominal == (-0.3, 0.7)
+    assert course.around.gravity == recording.gravity_mps2 and course.around.sees_rails is False
 
 
 @pytest.mark.parametrize("direction", [1, -1])
@@ -190,8 +207,36 @@ def test_the_sense_of_travel_is_held_at_rest() -> None:
     assert _sense(speed).tolist() == [1, 1, 1, 1, 1, 1, -1, -1, -1, -1, 1]
 
 
+def steps_with(forward: np.ndarray, *, resting: bool) -> Steps:
+    """Steps of a train whose accelerometer shows this along X."""
+    n = len(forward)
+    signals = np.zeros((n, 6))
+    signals[:, 3] = forward
+    time, none, no = 0.008 * np.arange(n), np.zeros(n), np.zeros(n, dtype=bool)
+    return Steps(time, time, 0.008, signals, none, np.zeros((n, 4)), no, np.full(n, resting))
+
+
 def test_the_jerk_is_the_slope_of_the_acceleration_of_the_past() -> None:
     time = 0.008 * np.arange(1000)
-    np.testing.assert_allclose(_jerk(0.3 * time, 0.008)[200:], 0.3)
+    steps, fast = steps_with(9.0 * time, resting=False), np.full(1000, 9.0)
+    np.testing.assert_allclose(_jerk(steps, fast, 0.3 * time)[200:], 0.3)
     step = np.where(time > 4.0, 1.0, 0.0)
-    assert not _jerk(step, 0.008)[time <= 4.0].any()
+    assert not _jerk(steps, fast, step)[time <= 4.0].any()
+
+
+@pytest.mark.parametrize("resting", [True, False])
+def test_where_a_train_begins_to_move_its_accelerometer_tells_the_jerk_at_once(resting: bool) -> None:
+    """Gravity beside it, which does not change, is no jerk; the odometry knows of nothing yet."""
+    time = 0.008 * np.arange(1000)
+    steps = steps_with(0.4 + 0.5 * np.maximum(time - 4.0, 0.0), resting=resting)
+    jerk = _jerk(steps, np.zeros(1000), np.zeros(1000))
+    assert not jerk[time <= 4.0].any()
+    np.testing.assert_allclose(jerk[time > 4.0 + START_JERK_S + 0.008], 0.5)
+
+
+def test_a_body_that_is_rocked_at_rest_has_no_jerk() -> None:
+    """Its pitch turns gravity into its accelerometer: a slope that is the rate of pitch itself, times g."""
+    time = 0.008 * np.arange(1000)
+    rocked = 9.81 * 1e-3 * np.sin(2.0 * np.pi * 0.5 * time)
+    assert not _jerk(steps_with(rocked, resting=True), np.zeros(1000), np.zeros(1000)).any()
+    assert _jerk(steps_with(rocked, resting=False), np.zeros(1000), np.zeros(1000)).any()

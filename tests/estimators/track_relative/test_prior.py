@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
 import twins.track_relative as twin
 from scipy.linalg import solve_continuous_lyapunov
 from simrail.estimators.track_relative import states as at
+from simrail.estimators.track_relative.full_rate import Waviness
 from simrail.estimators.track_relative.noise import (
     AXLE,
     BODY,
@@ -210,3 +211,11 @@ def test_a_model_of_a_scale_keeps_angles_and_its_own_metres() -> None:
     for name, value in vars(whole).items():
         power = 1 if name in of_metres else 2 if name == "y_bend_sd" else 0
         assert getattr(model, name) == pytest.approx(0.1**power * value, rel=1e-12), name
+
+
+def test_a_waviness_of_a_scale_keeps_angles_and_its_own_metres() -> None:
+    """At a tenth: every length and height a tenth, none left out."""
+    sizes = Waviness(1e-3, (2.0, 3.0), 2e-3, (4.0,), 3e-3, (5.0, 6.0, 7.0), 4e-3, (40.0, 8.0))
+    for name, value in asdict(sizes.at_scale(0.1)).items():
+        scale = 1.0 if name in ("roll_sd", "pitch_sd") else 0.1
+        assert value == pytest.approx(np.multiply(scale, getattr(sizes, name))), name

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,7 @@ from simrail.estimators.track_relative.kernel import SEGMENT
 from simrail.estimators.track_relative.noise import AXLE
 from simrail.estimators.track_relative.output import SD_COLUMNS, Trace
 from simrail.estimators.track_relative.prior import PARTS
-from simrail.estimators.track_relative.smoother import TrackRelativeSmoother
+from simrail.estimators.track_relative.smoother import PIECE, TrackRelativeSmoother, log_likelihood
 
 from simrail.core.columns import (
     ACCEL,
@@ -203,6 +204,23 @@ def test_pieces_do_not_show(rough: Callable, monkeypatch: pytest.MonkeyPatch) ->
         for name in ("states", "covariance", "surprises"):
             np.testing.assert_array_equal(getattr(pieces, name), getattr(whole, name), err_msg=name)
         assert pieces.log_likelihood == pytest.approx(whole.log_likelihood, rel=1e-12)
+
+
+def test_the_likelihood_is_half_of_what_the_filter_sums_of_every_piece(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Squares of surprises and logarithms of their variances, whose halves a normal density has."""
+    place = "simrail.estimators.track_relative.smoother"
+    sums = iter((3.0, 5.0, -1.0))
+    monkeypatch.setattr(f"{place}.linearised", lambda course, rows: None)
+    monkeypatch.setattr(f"{place}.run_filter", lambda *_: next(sums))
+    course = SimpleNamespace(
+        steps=SimpleNamespace(time_s=np.zeros(2 * PIECE + 1)),
+        rows=7,
+        start=np.zeros(at.STATES),
+        start_covariance=np.zeros((at.STATES, at.WIDTH)),
+    )
+    assert log_likelihood(course) == -3.5  # type: ignore[arg-type]
 
 
 def test_its_rails_have_the_step_that_is_asked_for(rough: Callable) -> None:

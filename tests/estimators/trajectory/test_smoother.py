@@ -124,6 +124,22 @@ def test_the_likelihood_alone_and_the_means_alone_are_the_same(line_recording: C
     assert len(means.covariance) == 0
 
 
+def test_what_was_found_stays_when_the_room_is_used_again(
+    line_recording: Callable, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """And without a room that is kept, where results replace the past, they are the same."""
+    model = TrajectorySmoother().model(WHERE["curve"](line_recording))
+    first = run_model(model, smoothed=True)
+    kept = first.states.copy(), first.covariance.copy(), first.innovations.copy()
+    few = model._replace(signals=-model.signals[:700])
+    run_model(few, smoothed=True)
+    for before, after in zip(kept, first[:3], strict=True):
+        np.testing.assert_array_equal(before, after)
+    monkeypatch.setattr("simrail.estimators.trajectory.smoother._ROOMS.most", 0)
+    for before, after in zip(kept, run_model(model, smoothed=True)[:3], strict=True):
+        np.testing.assert_array_equal(before, after)
+
+
 NAMES = [*ATTITUDE, *RELATIVE_POSITION]
 GRID_M = 0.1
 

@@ -7,7 +7,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from simrail.estimators.tuning.search import STEP, Least, Record, along_axes, differences, least
+from simrail.estimators.tuning.search import (
+    STEP,
+    Least,
+    Record,
+    _cma,
+    _descend,
+    along_axes,
+    differences,
+    least,
+)
 
 from simrail.core.jit import FloatArray
 from simrail.core.seeds import stream
@@ -136,6 +145,21 @@ def test_no_worse_than_its_start() -> None:
         return np.where(np.all(np.abs(points - 0.5) < 1e-6, axis=1), -1.0, 1.0)
 
     assert search(needle, evaluations=16).value == -1.0
+
+
+def test_each_stage_goes_down_by_itself() -> None:
+    """What one of the two leaves undone the other mends: alone, each has to find the valley."""
+    far, record = np.array([0.9, 0.1, 0.2, 0.8]), Record()
+
+    def ask(points: FloatArray) -> FloatArray:
+        return record.values(points, bowl)
+
+    _cma(ask, far, stream(1, "alone"), 1000)
+    assert record.best()[1] < -6.99
+    record = Record()
+    _descend(ask, far)
+    assert record.best()[1] == pytest.approx(-7.0, abs=1e-5)
+    assert record.asked < 1000
 
 
 def test_differences() -> None:

@@ -25,7 +25,19 @@ from simrail.estimators.trajectory.smoother import TrajectorySmoother, log_likel
 from simrail.estimators.tuning import tune as generic
 from simrail.estimators.tuning.cube import Cube
 from simrail.estimators.tuning.file import Tuning
-from simrail.estimators.tuning.identify import CONSTRAINT, FLAT, HELD, IDENTIFIED, LOWER, UPPER, identify
+from simrail.estimators.tuning.identify import (
+    CONSTRAINT,
+    FLAT,
+    HELD,
+    IDENTIFIED,
+    LOWER,
+    UPPER,
+    _from_log,
+    _moved,
+    _to_log,
+    _width,
+    identify,
+)
 from simrail.estimators.tuning.objectives import Likelihood, SmootherTuning, likelihoods
 from simrail.estimators.tuning.search import least
 from simrail.estimators.tuning.space import NAMES, SearchSpace
@@ -488,3 +500,15 @@ def test_what_cannot_be_tuned_is_refused() -> None:
         tunables_of(Scale(), {"by_kind": True}, method="cml")
     with pytest.raises(InputError, match="nothing to tune"):
         tunables_of(object(), {}, method="cml")
+
+
+def test_a_decade_of_a_linear_scale_is_a_tenth_of_its_box() -> None:
+    line, log = Parameter("a", "1", -2.0, 3.0, 0.0, scale="linear"), Parameter("b", "1", 1e-3, 1e4, 1.0)
+    assert [_moved(line, 1.0, decades=n) for n in (-1, 1, 2)] == pytest.approx([0.5, 1.5, 2.0])
+    assert [_moved(log, 0.2, decades=n) for n in (-1, 1, 2)] == pytest.approx([0.02, 2.0, 20.0])
+    # In logarithms a tenth of the box is ln 10; and there and back again.
+    for parameter, more in ((line, 0.5), (log, 9.0 * 0.2)):
+        there = [_to_log(parameter, value) for value in (0.2, 0.2 + more)]
+        assert there[1] - there[0] == pytest.approx(np.log(10.0))
+        assert _from_log(parameter, there[0]) == pytest.approx(0.2)
+    assert (_width(line), _width(log)) == pytest.approx((10.0 * np.log(10.0), 7.0 * np.log(10.0)))

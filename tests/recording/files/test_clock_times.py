@@ -8,6 +8,7 @@ import pytest
 
 from simrail.core.errors import InputError
 from simrail.recording.files.clock_times import DAY_S, HOUR_S, continued, read_times
+from simrail.recording.files.stamps import RideClock
 
 FIRST = pd.Timestamp("2024-05-31 23:59:59.250")
 SINCE = np.array([0.0, 0.5, 1.0, 1.5])
@@ -72,3 +73,24 @@ def test_what_is_no_time_is_named_in_one_line(texts: list[str | None], named: st
     line = str(error.value)
     assert "\n" not in line and "31.05.2024 12:00:00.123" in line and "f.csv: t" in line
     assert error.value.value == named
+
+
+@pytest.mark.parametrize(
+    ("first", "other", "goes_on"),
+    [
+        ([86390.0, 86395.0, 0.0, 5.0], [2.0, 7.0], [86402.0, 86407.0]),
+        ([86390.0, 86395.0], [86380.0, 86385.0], [86380.0, 86385.0]),
+        ([3.0, 8.0], [86398.0, 1.0], [-2.0, 1.0]),
+        ([43_000.0, 43_001.0], [43_002.0, np.nan], [43_002.0, np.nan]),
+    ],
+)
+def test_a_signal_that_begins_across_midnight_is_on_the_day_of_the_first(
+    first: list[float], other: list[float], goes_on: list[float]
+) -> None:
+    """The nearest one, before or after: a logger starts its signals within seconds."""
+    clock, notes = RideClock(), []  # type: ignore[var-annotated]
+    own = clock._over_midnight(np.array(first), DAY_S, "imu", notes)
+    assert (np.diff(own) > 0.0).all() and own[0] == first[0]
+    beside = clock._over_midnight(np.array(other), DAY_S, "encoder", notes)
+    np.testing.assert_array_equal(beside, goes_on)
+    assert len(notes) == sum(bool(np.any(np.diff(each) < 0.0)) for each in (first, other))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +17,8 @@ from simrail.core.columns import ACCEL, ATTITUDE, GYRO, IMU
 from simrail.core.errors import InputError
 from simrail.estimation.choose_odometry import with_odometry
 from simrail.estimation.recorded_ride import read_ride
-from simrail.recording.recording import OdometerSheet, Recording
+from simrail.recording.files.ride_file import EncoderSignalPart
+from simrail.recording.recording import EncoderSheet, OdometerSheet, Recording
 from simrail.ride.kinematic import kinematic_truth
 from simrail.ride.truth import Mount, Truth
 from simrail.sensors.encoder import EncoderSpec, sample_encoder
@@ -276,3 +278,10 @@ def test_speed_filter_is_causal_and_signed():
     np.testing.assert_array_equal(back["position_m"], -whole["position_m"])
     # s = t^2/2 while the speed rises evenly, known to a small lag.
     assert whole["position_m"].iloc[-1] - 5.0 == pytest.approx(32.0 + 8.0 * 7.99, abs=0.3)
+
+
+def test_how_well_a_radius_is_known_is_what_the_ride_says_of_it_or_the_sheet() -> None:
+    sheet = EncoderSheet("wheel", 1024, 0.46, 20.0, radius_relative_sd=0.01)
+    told = EncoderSignalPart.model_construct(sheet=sheet, radius_relative_sd=0.004)
+    assert told.known == replace(sheet, radius_relative_sd=0.004)
+    assert EncoderSignalPart.model_construct(sheet=sheet, radius_relative_sd=None).known == sheet

@@ -1,6 +1,7 @@
 """Units of data sheets, and the Allan deviation of a Gauss-Markov process."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -16,8 +17,9 @@ from simrail.recording.sheets.allan import (
     bias_sd,
     gauss_markov_allan,
 )
+from simrail.recording.sheets.figures import FIGURES
 from simrail.recording.sheets.grades import ImuGrade
-from simrail.recording.sheets.imu_file import ImuFile, load_grade
+from simrail.recording.sheets.imu_file import ImuFile, load_grade, load_imu
 
 
 def test_data_sheet_units_by_hand():
@@ -118,3 +120,15 @@ def test_impossible_imu_files_are_refused(change, part):
         judge(ImuFile, data, file="mine.toml")
     assert part in str(caught.value)
     assert "mine.toml" in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "key", ["gyro_noise_degpsqrthz", "gyro_noise_degpsqrth", "accel_bias_instability_ug"]
+)
+def test_another_figure_takes_the_place_of_its_quantity_in_whatever_unit(key: str) -> None:
+    """Whichever unit the sheet has it in: it is given once afterwards, and nothing else has changed."""
+    file, grade = load_imu("tactical")
+    other = file.with_figures({key: 0.5}).grade("tactical")
+    field = FIGURES[key].field
+    assert getattr(other, field) == pytest.approx(0.5 * FIGURES[key].si)
+    assert replace(other, assumed=grade.assumed, **{field: getattr(grade, field)}) == grade

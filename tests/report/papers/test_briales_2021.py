@@ -283,7 +283,12 @@ def test_the_section_stands_on_the_page(tmp_path: Path, no_pictures_of_rides: No
         manifest=describe(scenario, result),
     )
     text = (tmp_path / "report.html").read_text(encoding="utf-8")
-    assert '<details class="part" id="paper"><summary><h2>Beside Briales et al. 2021</h2>' in text
+    (head,) = re.findall(r'<details class="part" id="paper"><summary><h2>(.*?)</h2>', text)
+    (made,) = section(PageData(scenario, result.scores, result.cells, result.examples[:1], {}))
+    asked = [claim for claim in made.data["all_claims"] if claim.verdict != "not asked"]
+    same = sum(claim.verdict == "reproduced" for claim in asked)
+    assert 0 < same < len(asked)
+    assert head == f"Beside Briales et al. 2021: {same} of {len(asked)} claims reproduced"
     assert "8.25" in text and "Does not reproduce." in text and "track acceleration" in text
 
 

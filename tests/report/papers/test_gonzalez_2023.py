@@ -335,6 +335,26 @@ def test_rows_are_of_the_map_that_errs_whatever_comes_first() -> None:
     assert alone is not None and "an exact map (ablation)" in alone.where
 
 
+def test_noise_is_added_to_the_same_ride_with_the_same_odometry() -> None:
+    """Beside a case stands that of the same ride, odometry and vehicle, whichever comes first."""
+    ran = methods(load_scenario("metro_geometry"))
+    names = PAPER.names(ran)
+    rows = by_map(planted(), "drawn")
+    assert rows.noisy is not None
+    cases_of = []
+    for case in (rows.case, rows.noisy):
+        scores = {(names.get(key[0], key[0]), *key[1:]): mean for key, mean in case.scores.items()}
+        cases_of.append(replace(case, scores=scores))
+    plain, noisy = cases_of
+    for label in ("ride", "odometry", "vehicle", "map"):
+        other = replace(noisy, labels=noisy.labels | {label: "another"})
+        found = rows_of([other, plain, noisy], ran, band="paper")
+        assert found is not None and found.noisy is not None
+        assert (found.case.labels, found.noisy.labels) == (plain.labels, noisy.labels), label
+        alone = rows_of([other, plain], ran, band="paper")
+        assert alone is not None and alone.noisy is None, label
+
+
 def test_what_the_map_costs_is_told_of_the_tuning_that_loses_the_most() -> None:
     erring = by_map(planted({("kom", "alignment"): 2.0, ("cml", "cross_level"): 1.5}), "drawn")
     told = cost_paragraph(erring, by_map(planted(), "exact"), MAP)

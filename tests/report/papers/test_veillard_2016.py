@@ -367,6 +367,23 @@ def test_sums_of_speed_and_acceleration_lead_where_their_errors_do() -> None:
     assert distances_of(one, "none") is None
 
 
+def test_errors_are_shares_of_the_way_there_and_back() -> None:
+    """100 m out and 60 m back at 10 Hz: 160 m of way; what is found says 40 m and 8 m more, or 16 m less."""
+    true = np.concatenate([np.linspace(0.0, 100.0, 101), np.linspace(99.0, 40.0, 60)])
+    speed = np.zeros(161)
+    speed[0] = 480.0  # 0.1 s of it are 48 m
+    acceleration = np.zeros(161)
+    acceleration[-16] = 150.0  # felt by 16 sums of 0.1 s after one of 0.1 s: 24 m
+    states = pd.DataFrame({"speed_mps": speed, ACCELERATION[0]: acceleration})
+    one = SimpleNamespace(
+        estimates={"found": SimpleNamespace(states=states)},
+        recording=SimpleNamespace(imu_sheet=SimpleNamespace(rate_hz=10.0)),
+        motion=pd.DataFrame({"position_m": true}),
+    )
+    found = distances_of(one, "found")  # type: ignore[arg-type]
+    assert found == pytest.approx((5.0, -10.0))
+
+
 def test_the_curve_that_is_drawn_is_that_which_leans() -> None:
     """Not the sharpest, whose cant carries all of it."""
     assert sharpest(example()) == (1650.0, 1850.0)

@@ -1,6 +1,8 @@
 """Rides that shake: lines where they belong, derivatives that agree, and silence that stays silent."""
 
 from dataclasses import replace
+from itertools import pairwise
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,7 +18,7 @@ from simrail.ride.ride import Ride, is_cached, simulate
 from simrail.ride.truth import BodyMotion, Mount, Truth
 from simrail.ride.vibration.files import read_short_waves, write_short_waves
 from simrail.ride.vibration.floor import Floor
-from simrail.ride.vibration.run import Shaker, linear_vehicle_of
+from simrail.ride.vibration.run import Piece, Shaker, linear_vehicle_of
 from simrail.ride.vibration.short_waves import ShortWaves, superposed
 from simrail.ride.vibration.sources import (
     CarBending,
@@ -515,6 +517,40 @@ def test_a_wheel_that_would_leave_the_rail_is_told_of(coach, line, tmp_path):
     (line_of_it,) = short.warnings()
     assert "would leave the rail" in line_of_it
     assert ShortWaves({}, 1.5, {}, least_share_of_load={"w": 0.2}).warnings() == []
+
+
+@pytest.mark.parametrize("cuts", [(0, 1001), (0, 7, 400, 1001), (0, 3, 10, 11, 700, 1001)])
+def test_pieces_are_kept_as_one(coach, line, tmp_path, monkeypatch, cuts):
+    """Loads of every 7th row of the ride, wherever pieces begin; the least share is that of any of them."""
+    wheels = coach.wheel_names
+    truth = gliding(coach, line, 20.0, duration_s=1.0, rate_hz=1000.0)
+    contact = np.zeros((143, 12))
+    truth = replace(truth, contacts=dict.fromkeys(wheels, contact), contact_every=7)
+    rng = np.random.default_rng(2)
+    loads = rng.normal(0.0, 1e3, (1001, len(wheels)))
+    loads[2, 0] = -9e3
+    motions = {body: rng.normal(size=(1001, 12)) for body in truth.body_names}
+
+    def pieces():
+        for first, last in pairwise(cuts):
+            here = slice(first, last)
+            yield Piece(first, {body: motion[here] for body, motion in motions.items()}, {}, loads[here])
+
+    shaker = SimpleNamespace(bendings=(), run=pieces)
+    monkeypatch.setattr("simrail.ride.vibration.files.Shaker", lambda *_, **__: shaker)
+    write_short_waves(ALL, truth, coach, tmp_path, seed=1, manifest={})
+    short = read_short_waves(tmp_path, 1001)
+    for w, wheel in enumerate(wheels):
+        np.testing.assert_allclose(short.loads[wheel], loads[::7, w], rtol=1e-6, atol=1e-3)
+    static = coach.wheel_load_n(truth.gravity_mps2)
+    least = {wheel: 1.0 + loads[:, w].min() / static[w] for w, wheel in enumerate(wheels)}
+    assert short.least_share_of_load == pytest.approx(least)
+    for body, motion in motions.items():
+        np.testing.assert_allclose(short.motions[body], motion, rtol=1e-6, atol=1e-6)
+    shaking = replace(truth, short_waves=short)
+    np.testing.assert_allclose(shaking.short_wave_load(wheels[1]), loads[::7, 1], rtol=1e-6, atol=1e-3)
+    still = truth.short_wave_load(wheels[0])
+    assert len(still) == len(contact) and not still.any()
 
 
 def test_rates_must_fit(coach, line):

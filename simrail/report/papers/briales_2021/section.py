@@ -30,7 +30,7 @@ from simrail.report.papers.briales_2021.rides import (
     rides_of,
 )
 from simrail.report.papers.briales_2021.terms import SLOW_PART_HZ, TERMS_RIDE, terms_table
-from simrail.report.papers.claim import judged, with_ablation
+from simrail.report.papers.claim import judged, title_of, with_ablation
 from simrail.report.tables.methods import MethodStyle
 from simrail.report.tables.tables import NONE, Cell, Row, Table, number_cell
 from simrail.report.words.ablations import WORDS
@@ -63,7 +63,7 @@ def section(data: PageData) -> list[Section]:
             # How roll repeats is of the rides that are drawn, none of which is of an ablation.
             beside = judges.Evidence(twin, {}, evidence.wrong_sign_deg)
             claims = with_ablation(claims, judged(PAPER, beside, judges, has=twin.has), one)
-    shown = {
+    shown: dict[str, Any] = {
         "paper": PAPER,
         "design": _table(rides, looks, reference="design"),
         "truth": _table(rides, looks, reference="truth"),
@@ -77,7 +77,8 @@ def section(data: PageData) -> list[Section]:
         **_terms(drawn),
         **_drawings(rides, looks, drawn),
     }
-    return [Section("paper", f"Beside {PAPER.heading}", "papers/briales_2021/section.html.j2", shown)]
+    title = title_of(PAPER, shown["all_claims"])
+    return [Section("paper", title, "papers/briales_2021/section.html.j2", shown)]
 
 
 def _table(rides: Rides, looks: Mapping[str, MethodStyle], *, reference: str) -> Table:

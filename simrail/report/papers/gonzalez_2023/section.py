@@ -5,13 +5,14 @@ Everything of ours is looked up in the scores, or computed from the first draw o
 
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from simrail.campaign.cell import CellResult
 from simrail.report.figures.geometry import has_rails, lines_of
 from simrail.report.pages.section import PageData, Section
-from simrail.report.papers.claim import judged, with_ablation
+from simrail.report.papers.claim import judged, title_of, with_ablation
 from simrail.report.papers.gonzalez_2023 import judges, parts, tunings
 from simrail.report.papers.gonzalez_2023.figures import noise_figure, tuning_figures
 from simrail.report.papers.gonzalez_2023.parts import COLUMNS, FILTERED, PAPER, OtherSize, Rows, column_words
@@ -85,7 +86,7 @@ def section(data: PageData) -> list[Section]:
     drawings = tuning_figures(seen, example, band) if example else []
     if example and noisy:
         drawings += noise_figure(rows, looks, example, noisy, band)
-    shown = {
+    shown: dict[str, Any] = {
         "where": rows.where,
         "size": size,
         "is_model": size == parts.MODEL,
@@ -102,7 +103,8 @@ def section(data: PageData) -> list[Section]:
         "notes": [note for note in notes if note],
         "drawings": drawings,
     }
-    return [Section("paper", f"Beside {PAPER.heading}", "papers/gonzalez_2023/section.html.j2", shown)]
+    title = title_of(PAPER, shown["all_claims"])
+    return [Section("paper", title, "papers/gonzalez_2023/section.html.j2", shown)]
 
 
 def _example_of(data: PageData, case: Case | None) -> CellResult | None:

@@ -3,12 +3,13 @@
 import math
 from dataclasses import replace
 from functools import partial
+from typing import Any
 
 from simrail.campaign.cell import CellResult
 from simrail.report.figures import canvas
 from simrail.report.figures.geometry import has_rails, rails_figure, stretch_of, stretch_words
 from simrail.report.pages.section import PageData, Section
-from simrail.report.papers.claim import judged
+from simrail.report.papers.claim import judged, title_of
 from simrail.report.papers.hidalgo import judges
 from simrail.report.papers.hidalgo.places import BAND, PAPER, Places, places_of
 from simrail.report.tables.methods import MethodStyle
@@ -33,7 +34,7 @@ def section(data: PageData) -> list[Section]:
         for style in data.styles
         if style.name == name
     }
-    shown = {
+    shown: dict[str, Any] = {
         "paper": PAPER,
         "table": _table(places),
         "draws": places.table.index.get_level_values("draw").nunique(),
@@ -42,7 +43,8 @@ def section(data: PageData) -> list[Section]:
         "notes": judges.notes(places),
         "drawings": [drawing for example in data.examples for drawing in _drawings(example, looks)],
     }
-    return [Section("paper", f"Beside {PAPER.heading}", "papers/hidalgo/section.html.j2", shown)]
+    title = title_of(PAPER, shown["all_claims"])
+    return [Section("paper", title, "papers/hidalgo/section.html.j2", shown)]
 
 
 def _table(places: Places) -> Table:

@@ -2,12 +2,13 @@
 
 from dataclasses import replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 
 from simrail.report.figures import canvas
 from simrail.report.pages.section import PageData, Section
-from simrail.report.papers.claim import judged
+from simrail.report.papers.claim import judged, title_of
 from simrail.report.papers.veillard_2016 import judges
 from simrail.report.papers.veillard_2016.figures import (
     curve_figure,
@@ -42,7 +43,7 @@ def section(data: PageData) -> list[Section]:
     distances = {mount: one for mount, one in led.items() if one is not None}
     evidence = judges.Evidence(lines, spectra, distances)
     first = lines.draws(next(iter(lines.names)), "speed", lines.mounts[0])
-    shown = {
+    shown: dict[str, Any] = {
         "paper": PAPER,
         "lines": max(first.line_count, 1),
         "recordings": max(lines.recordings(mount) for mount in lines.mounts),
@@ -58,7 +59,8 @@ def section(data: PageData) -> list[Section]:
             for mount, example in drawn.items()
         ],
     }
-    return [Section("paper", f"Beside {PAPER.heading}", "papers/veillard_2016/section.html.j2", shown)]
+    title = title_of(PAPER, shown["all_claims"])
+    return [Section("paper", title, "papers/veillard_2016/section.html.j2", shown)]
 
 
 def table_of(lines: Lines, mount: str) -> Table:
