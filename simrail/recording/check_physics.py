@@ -13,7 +13,8 @@ from simrail.core.columns import ACCEL, GYRO
 from simrail.core.errors import InputError
 from simrail.recording.evidence.axes import SURE, Slope, means, slope
 from simrail.recording.evidence.devices import weigh_all
-from simrail.recording.evidence.judge import Evidence, refuse_wrong
+from simrail.recording.evidence.exchanged import weigh_exchange
+from simrail.recording.evidence.judge import Evidence, error_of, refuse_wrong
 from simrail.recording.evidence.way import way_of
 from simrail.recording.recording import Recording, imus
 from simrail.recording.signals import FORCES
@@ -101,7 +102,10 @@ def _check_gravity(recording: Recording, table: str) -> None:
     slack = GRAVITY_SHARE * gravity + recording.imu_sheet.accel_turn_on_bias_mps2
     shown = f"{size:.4g} m/s2 {when}"
     if abs(size - gravity) > slack:
-        remedy = "set units.accel, or mend the scale"
+        remedy = (
+            f"it is {size / gravity:.3g} times gravity: set units.accel, or mend imu.scale.accel, of "
+            "all columns or of Z alone"
+        )
         if size < slack:
             remedy = (
                 "gravity has been taken off (a phone's linear acceleration): log the accelerometer as it is, "
@@ -130,6 +134,9 @@ def _check_gravity(recording: Recording, table: str) -> None:
         )
     if found[2] < UPRIGHT * size:
         axis = int(np.argmax(np.abs(found)))
+        exchanged = weigh_exchange(recording)
+        if exchanged is not None:  # only the columns of the accelerometer: the gyro stands upright
+            raise error_of(exchanged.findings[-1])
         raise InputError(
             f"gravity lies along {'-' if found[axis] < 0 else ''}{'XYZ'[axis]} of the body, not Z",
             field=f"{table}.axes",

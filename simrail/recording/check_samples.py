@@ -9,6 +9,7 @@ and a signal that is large as a whole is left to those who judge units (`simrail
 """
 
 from collections.abc import Callable
+from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
@@ -146,6 +147,7 @@ def check_samples(
     def place(sample: int) -> str:
         return f"{where(sample)} (time_s = {time[sample]:.6g})"
 
+    _check_copies(channels, file)
     _check_zeros(channels, kind, place, file)
     for channel in channels:
         apart = markers(channel.values, still=_STILL[kind], limit=bounds.range, unit_si=channel.si)
@@ -157,6 +159,22 @@ def check_samples(
             _check_steps(channel, _COARSE[kind], place, file)
     if kind != "field":  # a slow magnetometer is often logged at the rate of the IMU
         _check_held(channels, bounds, time, place, file)
+
+
+def _check_copies(channels: tuple[Channel, ...], file: str | None) -> None:
+    """Refuse a column that holds what another one does, but for its sign: no two axes measure the same."""
+    for first, second in combinations(channels, 2):
+        one, other = first.values, second.values
+        lives = len(one) > STUCK_SAMPLES and len(np.unique(one)) > STUCK_SAMPLES // 2
+        if lives and (np.array_equal(one, other) or np.array_equal(one, -other)):
+            raise InputError(
+                f"holds the same samples as {first.name}",
+                file=file,
+                field=second.name,
+                value=f"{len(one)} samples that are equal",
+                limit="samples of its own",
+                remedy="mend the names in columns, or the logger: one axis stands there twice",
+            )
 
 
 def markers(

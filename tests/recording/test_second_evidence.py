@@ -218,11 +218,11 @@ def test_axes_are_judged_where_no_device_is_wrong_or_each_column_by_itself(
         return Finding("gyro", "the gyro", 1.0, 0.1, 0.0, "1", "curves", verdict)
 
     place = "simrail.recording.evidence.devices"
-    monkeypatch.setattr(f"{place}.weigh", lambda _: Evidence((found(whole),)))
-    monkeypatch.setattr(f"{place}.weigh_axes", lambda _: (found("axis"),))
-    monkeypatch.setattr(f"{place}.are_columns", lambda _: columns)
+    monkeypatch.setattr(f"{place}.weigh", lambda *_: Evidence((found(whole),)))
+    monkeypatch.setattr(f"{place}.weigh_axes", lambda *_: (found("axis"),))
+    monkeypatch.setattr(f"{place}.are_columns", lambda *_: columns)
     monkeypatch.setattr(f"{place}.weigh_second", lambda *_: (found("second"),))
-    monkeypatch.setattr(f"{place}.weigh_field_clock", lambda _: (found("clock"),))
+    monkeypatch.setattr(f"{place}.weigh_field_clock", lambda *_: (found("clock"),))
     told = weigh_all(None)  # type: ignore[arg-type]
     assert [finding.verdict for finding in told.findings] == verdicts
 

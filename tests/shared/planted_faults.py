@@ -5,9 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 import pandas as pd
+from scipy.signal import lfilter
 
 from simrail.core.columns import ACCEL, GYRO
 from simrail.core.rotation import rotation_matrix
+from simrail.recording.evidence.model import retimed
 from simrail.recording.recording import Recording
 
 
@@ -70,6 +72,51 @@ def _stamped(recording: Recording, stamp: Callable[[np.ndarray], np.ndarray]) ->
     assert recording.encoder is not None
     counts = recording.encoder.copy()
     counts.index = pd.Index(stamp(counts.index.to_numpy()), name="time_s")
+    return replace(recording, encoder=counts)
+
+
+def axis(column: str) -> Callable[[Recording, float], Recording]:
+    """One axis of an IMU that reads so many times what it should."""
+
+    def plant(recording: Recording, factor: float) -> Recording:
+        return replace(recording, imu=recording.imu.assign(**{column: factor * recording.imu[column]}))
+
+    return plant
+
+
+def exchanged(recording: Recording, first: str, second: str) -> Recording:
+    """An IMU of which two columns stand in each other's place."""
+    imu = recording.imu
+    return replace(recording, imu=imu.assign(**{first: imu[second], second: imu[first]}))
+
+
+def slow(columns: Sequence[str]) -> Callable[[Recording, float], Recording]:
+    """A sensor behind a low-pass of the first order, of a time constant in seconds."""
+
+    def plant(recording: Recording, seconds: float) -> Recording:
+        decay = float(np.exp(-1.0 / (seconds * recording.imu_sheet.rate_hz)))
+        imu = recording.imu.copy()
+        for name in columns:
+            values = imu[name].to_numpy()
+            imu[name] = lfilter([1.0 - decay], [1.0, -decay], values, zi=[decay * values[0]])[0]
+        return replace(recording, imu=imu)
+
+    return plant
+
+
+def pace(recording: Recording, factor: float) -> Recording:
+    """Stamps of all devices that run so many times as fast as the ride."""
+    return retimed(recording, 1.0 / factor)
+
+
+def slipping(recording: Recording, speed_mps: float) -> Recording:
+    """A wheel that spins up between 10 and 14 s, by so much, and comes back."""
+    assert recording.encoder is not None and recording.encoder_sheet is not None
+    counts = recording.encoder.copy()
+    time = counts.index.to_numpy()
+    excess = np.interp(time, [10.0, 10.6, 13.4, 14.0], [0.0, speed_mps, speed_mps, 0.0])
+    lost_m = np.cumsum(excess) * float(time[1] - time[0])
+    counts["pulse_count"] += np.rint(lost_m / recording.encoder_sheet.pulse_m).astype(np.int64)
     return replace(recording, encoder=counts)
 
 

@@ -4,19 +4,28 @@ The fit of `simrail.recording.evidence.judge` holds a device as a whole: its axe
 gives one column the other sign makes a device that there is not. So each axis is held alone against what the
 map and the way let expect of it, in means over a second: the gyro's X against the roll rate of
 transitions, its Y against the pitch rate of vertical curves and what cant leaves of a turn, the
-accelerometer's X against changes of speed, its Y against what speed and cant leave of curves. On a level line
-without cant nothing tells of the gyro's Y, and that is said.
+accelerometer's X against changes of speed, its Y against what speed and cant leave of curves, its Z against
+gravity. On a level line without cant nothing tells of the gyro's Y, and that is said.
+
+Such a slope tells another sign or unit, whatever else the ride is. Its number comes from the fit of all
+(`simrail.recording.evidence.single`), which also tells a factor of 1.1, a column that is late alone, a sensor
+behind a low-pass, and stamps whose second is none.
 """
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from simrail.core.columns import ACCEL, GYRO
 from simrail.core.jit import FloatArray
-from simrail.recording.evidence.finding import Finding, Verdict
+from simrail.recording.evidence.finding import LIKELY, Finding, Verdict, verdict_of
+from simrail.recording.evidence.finding import SURE as CERTAIN
+from simrail.recording.evidence.model import ACCEL_GAIN, CUTS, GAINS, LATES, OF_CHANNEL, PACE, RAMPS, SLOW
+from simrail.recording.evidence.single import Single, Up, up_of
+from simrail.recording.evidence.slack import distance
 from simrail.recording.evidence.way import way_of
 from simrail.recording.recording import Recording
 
@@ -73,7 +82,7 @@ class Axis(NamedTuple):
 
 
 RX, RY, RZ = GYRO
-FX, FY = ACCEL[:2]
+FX, FY, FZ = ACCEL
 
 AXES = {
     RX: Axis("gyro X alone", "the roll rate of the transitions", "no transition with cant"),
@@ -83,6 +92,13 @@ AXES = {
     FY: Axis("accelerometer Y alone", "what speed and cant leave of the curves", "no curve to feel"),
 }
 """Which axes are judged, in the order in which they are told."""
+
+APART = 1.5
+"""Standard deviations between two explanations from which on one is preferred."""
+
+ALL_ACCEL = "factor of the accelerometer"
+
+SENSORS = {SLOW[0]: "gyro", SLOW[1]: "accelerometer"}
 
 LEAST = dict.fromkeys((RX, RY, RZ), 2e-4) | dict.fromkeys((FX, FY), 0.02)
 """Rms of what the line lets expect, in means over a second, rad/s and m/s2, below which it tells nothing of
@@ -100,17 +116,55 @@ gyro of the other sense, a train that ran the other way; and what either of them
 tells anything."""
 
 
-def weigh_axes(recording: Recording) -> tuple[Finding, ...]:
-    """What a ride says of each axis alone; nothing without a map or a way.
+def weigh_axes(recording: Recording, single: Single | None = None) -> tuple[Finding, ...]:
+    """What a ride says of each axis alone, of its sensors and its time; nothing without a map or a way.
 
     Parameters
     ----------
     recording : Recording
         A ride.
+    single : Single, optional
+        What the fit of all says of them.
     """
+    slopes, crossed = _slopes(recording)
+    if not slopes:
+        return ()
+    findings = [_judged(name, slopes[name]) for name in AXES]
+    if findings[0].wrong and abs(crossed.value) > OTHER_SIGN and abs(crossed.value) > SURE * crossed.sd:
+        findings[0] = _finding(
+            RX,
+            slopes[RX],
+            "surely wrong",
+            f"does not roll in the transitions, but its Y does, {crossed.value:.2g} times: their columns are "
+            "swapped",
+            "mend the order in columns.gyro, or the axes",
+        )
+    if single is not None:
+        findings = [_numbered(finding, i, single) for i, finding in enumerate(findings)]
+        findings += [of_all(name, single) for name in single.free if name not in (*GAINS, *LATES)]
+    return (*findings, _upright(recording, single))
+
+
+def _slopes(recording: Recording) -> tuple[dict[str, Slope], Slope]:
+    """Slope of each axis on what is expected of it, and of the gyro's Y on its X's; nothing without a way."""
+    expected = expected_of(recording)
+    if not expected:
+        return {}, Slope(1.0, math.inf)
+    found = {name: seconds_of(recording, name) for name in AXES}
+    slopes = {name: slope(found[name], expected[name], LEAST[name]) for name in AXES}
+    return slopes, slope(found[RY], expected[RX], LEAST[RX])
+
+
+def seconds_of(recording: Recording, name: str) -> FloatArray:
+    """Means (n,) over a second of a column of the IMU."""
+    return means(recording.imu[name].to_numpy(), max(1, round(recording.imu_sheet.rate_hz)))
+
+
+def expected_of(recording: Recording) -> dict[str, FloatArray]:
+    """Means (n,) over a second that map and way let expect of each of `AXES`; nothing without either."""
     way = way_of(recording) if recording.track.is_map else None
     if way is None:
-        return ()
+        return {}
     count, time = max(1, round(recording.imu_sheet.rate_hz)), recording.imu.index.to_numpy(dtype=np.float64)
     went, speed, push = (
         means(np.interp(time, way.time_s, values), count)
@@ -119,27 +173,220 @@ def weigh_axes(recording: Recording) -> tuple[Finding, ...]:
     frame = recording.track.frame_extended(recording.start_position_m + went)
     along, level = -np.sin(frame.pitch_rad), np.cos(frame.pitch_rad) * np.sin(frame.roll_rad)
     gravity = recording.gravity_mps2
-    expected = {
+    return {
         RX: frame.k[:, 0] * speed,
         RY: frame.k[:, 1] * speed,
         RZ: frame.k[:, 2] * speed,
         FX: push + gravity * along,
         FY: frame.k[:, 2] * speed**2 + gravity * level,
     }
-    found = {name: means(recording.imu[name].to_numpy(), count) for name in AXES}
-    slopes = {name: slope(found[name], expected[name], LEAST[name]) for name in AXES}
-    findings = [_judged(name, slopes[name]) for name in AXES]
-    across = slope(found[RY], expected[RX], LEAST[RX])
-    if findings[0].wrong and abs(across.value) > OTHER_SIGN and abs(across.value) > SURE * across.sd:
-        findings[0] = _finding(
-            RX,
-            slopes[RX],
-            "surely wrong",
-            f"does not roll in the transitions, but its Y does, {across.value:.2g} times: their columns are "
-            "swapped",
-            "mend the order in columns.gyro, or the axes",
+
+
+def _numbered(finding: Finding, channel: int, single: Single) -> Finding:
+    """The finding of an axis with its number, by the fit of all."""
+    name, gain, late = OF_CHANNEL[channel], GAINS[channel], LATES[channel]
+    if gain in single.free:
+        return _scaled(name, Slope(*single.told[gain]), _told(gain, single), _or(gain, single))
+    if late in single.free:
+        value, side = single.told[late][0], "late" if single.told[late][0] < 0.0 else "early"
+        return replace(
+            _finding(name, Slope(*single.told[late]), verdict_of(single.off(late))),
+            name=f"{AXES[name].name}: offset of its clock",
+            nominal=0.0,
+            unit="s",
+            verdict=_told(late, single),
+            why=f"is {abs(value):.2f} s {side}, against all other axes",
+            remedy="; or ".join(
+                part
+                for part in (
+                    "shift that column alone, by so many samples: no setting does",
+                    _or(late, single),
+                )
+                if part
+            ),
         )
-    return tuple(findings)
+    if single.free or finding.verdict == "sound":
+        found = Slope(*single.told[gain])
+        if found.sd > WANTED or single.off(gain) > LIKELY:
+            return _finding(name, found, "could not be judged", "the ride tells too little of it")
+        return _finding(name, found, "sound")
+    return finding
+
+
+def _scaled(name: str, found: Slope, verdict: Verdict, rival: str) -> Finding:
+    """The finding of an axis that has another factor, or the other sign."""
+    of = AXES[name].of
+    unit = "mend the unit: one axis alone has another one"
+    if found.value < 0.0:
+        why, remedy = f"goes against {of}", "give that column alone the other sign, or mend the axes"
+    elif found.value > OTHER_UNIT:
+        why, remedy = f"is many times {of}", unit
+    elif found.value < NEXT_TO_NONE:
+        why, remedy = f"has next to nothing of {of}", f"{unit}; or the order of the columns"
+    else:
+        why, remedy = f"is {found.value:.3g} times {of}", "mend the scale: one axis alone has another one"
+    remedy = "; or ".join(part for part in (remedy, rival) if part)
+    kind = "gyro" if name in GYRO else "accel"
+    return replace(_finding(name, found, verdict, why, remedy), setting=f"imu.scale.{kind}")
+
+
+def _told(name: str, single: Single) -> Verdict:
+    """The judgement of what the fit sets free; what others that came after it explain is no fault."""
+    if single.off(name) > CERTAIN:
+        return "surely wrong"
+    if name in SLOW and single.off(name) < LIKELY:
+        return "could not be judged"  # springs do as much
+    return "likely wrong" if distance(name, *single.told[name], 0.0) > LIKELY else "could not be judged"
+
+
+def _or(name: str, single: Single) -> str:
+    """What explains the ride nearly as well as the last that was set free."""
+    if name != single.free[-1] or not single.rivals:
+        return ""
+    return "this ride hardly tells it from " + " or ".join(_words(rival) for rival in single.rivals)
+
+
+def _words(name: str) -> str:
+    """One of `SINGLE` in words."""
+    if name in GAINS:
+        return f"another factor of {AXES[OF_CHANNEL[GAINS.index(name)]].name}"
+    if name in LATES:
+        return f"{AXES[OF_CHANNEL[LATES.index(name)]].name}, late"
+    if name in SLOW:
+        return f"a low-pass in the {SENSORS[name]}"
+    return "another factor of the accelerometer" if name == ACCEL_GAIN else "stamps whose second is none"
+
+
+def of_all(name: str, single: Single) -> Finding:
+    """The finding of a sensor, or of the time, that the fit has set free."""
+    value, sd = single.told[name]
+    if name in (*RAMPS, *CUTS):
+        return _unsteady(name, value, sd, single)
+    if name == PACE:
+        quantity, unit, nominal, field, setting = "pace of the time", "1", 1.0, "imu.units.time", ""
+        why = (
+            f"the time stamps run {value:.4g} times as fast as the ride, by its curves, its push and its way"
+        )
+        remedy = (
+            "mend units.time, tick_rate_hz or rate_hz of all its files: one of its seconds is "
+            f"{1.0 / value:.4g} s"
+        )
+    elif name == ACCEL_GAIN:
+        quantity, unit, nominal, field = ALL_ACCEL, "1", 1.0, "imu.accel"
+        setting, remedy = "imu.scale.accel", ""
+        why = f"shows {value:.3g} times the push, the curves and gravity"
+    else:
+        sensor, key = SENSORS[name], name.removeprefix("slow_")
+        quantity, unit, nominal, field, setting = f"low-pass in the {sensor}", "s", 0.0, f"imu.{key}", ""
+        why = (
+            f"a low-pass of {1.0 / (2.0 * math.pi * value):.2g} Hz (of the first order) makes the {sensor} "
+            f"{value:.2f} s late, and takes off what is faster"
+        )
+        remedy = (
+            f"set a wider bandwidth of the device; for the lag alone imu.{key}.time_offset_s = {-value:.2f}"
+        )
+    remedy = "; or ".join(part for part in (remedy, _or(name, single)) if part)
+    return Finding(
+        quantity,
+        name,
+        value,
+        sd,
+        nominal,
+        unit,
+        "all of the ride",
+        _told(name, single),
+        why,
+        setting,
+        field,
+        remedy,
+    )
+
+
+def _unsteady(name: str, value: float, sd: float, single: Single) -> Finding:
+    """The finding of a sensor whose offset grows in the ride, or that takes off what is slow."""
+    if name in RAMPS:
+        column = OF_CHANNEL[RAMPS.index(name)]
+        by, unit = (math.pi / 180.0, "deg/s") if column in GYRO else (1.0, "m/s2")
+        axis = AXES[column].name.removesuffix(" alone")
+        quantity, field = f"growth of the offset of {axis}", f"imu.{column}"
+        why = f"the offset of {axis} grows by {value / by:.3g} {unit} in the ride"
+        remedy = "take off what it shows at stops before and after; let the device warm up before a ride"
+    else:
+        sensor, key = ("gyro", "gyro") if name == CUTS[0] else ("accelerometer", "accel")
+        by, unit, quantity, field = 1.0, "rad/s", f"high-pass in the {sensor}", f"imu.{key}"
+        why = f"a high-pass of {1.0 / value:.2g} s takes off what the {sensor} shows longer"
+        remedy = "log raw samples: no automatic zero, no 'linear acceleration', no AC coupling"
+    return Finding(
+        quantity,
+        name,
+        value / by,
+        sd / by,
+        0.0,
+        unit,
+        "all of the ride",
+        _told(name, single),
+        why,
+        "",
+        field,
+        remedy,
+    )
+
+
+def _upright(recording: Recording, single: Single | None) -> Finding:
+    """The finding of the accelerometer's Z, by gravity."""
+    up = up_of(recording)
+    found, off = Slope(up.value, up.sd), abs(up.value - 1.0) / up.sd
+    verdict: Verdict = "surely wrong" if off > CERTAIN else "likely wrong" if off > LIKELY else "sound"
+    name, why, remedy, setting = "accelerometer Z alone", "", "", ""
+    if verdict != "sound":
+        why, setting = f"is {up.value:.3g} times gravity in the median of the ride", "imu.scale.accel"
+        remedy = "mend the scale, if one axis alone has another one, its offset, or gravity_mps2"
+        whole = _by_all(up, single)
+        if whole is None:
+            setting, remedy = (
+                "",
+                "mend imu.scale.accel, of Z alone or of all (the ride does not tell), or gravity_mps2",
+            )
+        elif whole and single is not None and ACCEL_GAIN in single.free:
+            verdict, why, setting = "could not be judged", "all of the accelerometer has another factor", ""
+        elif whole:
+            return Finding(
+                ALL_ACCEL,
+                ACCEL_GAIN,
+                up.value,
+                up.sd,
+                1.0,
+                "1",
+                "gravity, push and curves",
+                verdict,
+                why,
+                setting,
+                f"imu.{FZ}",
+                "",
+            )
+    return Finding(
+        name,
+        key_of(FZ),
+        found.value,
+        found.sd,
+        1.0,
+        "1",
+        "gravity",
+        verdict,
+        why,
+        setting=setting,
+        field=f"imu.{FZ}",
+        remedy=remedy,
+    )
+
+
+def _by_all(up: Up, single: Single | None) -> bool | None:
+    """Whether push and curves have the factor that gravity has; None where they do not tell."""
+    if single is None or ACCEL_GAIN not in single.told:
+        return None
+    value, sd = single.told[ACCEL_GAIN]
+    alone, whole = abs(value - 1.0) / sd, abs(value - up.value) / sd
+    return whole < alone if abs(alone - whole) > APART else None
 
 
 def are_columns(findings: Sequence[Finding]) -> bool:
@@ -150,9 +397,10 @@ def are_columns(findings: Sequence[Finding]) -> bool:
     Parameters
     ----------
     findings : sequence of Finding
-        Those of `weigh_axes`.
+        Those of `weigh_axes`, by the slopes alone.
     """
-    told = {finding.key: finding for finding in findings if finding.sd < WANTED}
+    judged = {key_of(name) for name in AXES}
+    told = {finding.key: finding for finding in findings if finding.sd < WANTED and finding.key in judged}
     against = {key for key, finding in told.items() if finding.value < 0.0}
     follow = all(1.0 / SQUARE < abs(finding.value) < SQUARE for finding in told.values())
     whole = any(

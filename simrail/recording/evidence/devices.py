@@ -2,12 +2,20 @@
 
 from dataclasses import replace
 
+from threadpoolctl import threadpool_limits
+
 from simrail.recording.evidence.axes import are_columns, weigh_axes
+from simrail.recording.evidence.clipped import weigh_clipped
+from simrail.recording.evidence.exchanged import weigh_exchange
 from simrail.recording.evidence.field_clock import weigh_field_clock
 from simrail.recording.evidence.finding import Finding
 from simrail.recording.evidence.judge import Evidence, weigh
 from simrail.recording.evidence.second import weigh_second
 from simrail.recording.recording import Recording
+
+MANY = 3
+"""So many figures that are wrong at once have one cause that is none of them: two mistakes in one file are
+rare, three are not met."""
 
 
 def weigh_all(recording: Recording) -> Evidence:
@@ -21,14 +29,72 @@ def weigh_all(recording: Recording) -> Evidence:
     recording : Recording
         A ride that has passed `simrail.recording.check_form.check_recording`.
     """
-    first, axes = weigh(recording), weigh_axes(recording)
+    first = weigh(recording)
+    axes = weigh_axes(recording, first.single)
+    if any(finding.wrong for finding in (*first.findings, *axes)):
+        exchanged = weigh_exchange(recording)
+        if exchanged is not None:
+            first, axes = exchanged, ()
+    are_signs = False
+    is_single = first.single is not None and bool(first.single.free)
     if any(finding.verdict == "surely wrong" for finding in first.findings):
-        if are_columns(axes):
-            first = replace(first, findings=tuple(_unjudged(finding) for finding in first.findings))
-        else:
+        slopes = weigh_axes(recording)
+        are_signs = are_columns(slopes)
+        if are_signs:
+            first, axes = (
+                replace(first, findings=tuple(_unjudged(finding) for finding in first.findings)),
+                slopes,
+            )
+        elif not is_single:
             axes = ()
-    beside = (*axes, *weigh_second(recording, first), *weigh_field_clock(recording))
+    if not are_signs:
+        first, axes = _at_once(first, axes)
+    clipped = weigh_clipped(recording)
+    cut = {finding.key.replace("clipped", "alone", 1) for finding in clipped}
+    axes = tuple(_cut(finding) if finding.key in cut else finding for finding in axes)
+    beside = (*axes, *clipped, *weigh_second(recording, first))
+    with threadpool_limits(1):  # as for the fits: its matrices are small, too
+        beside += weigh_field_clock(recording)
     return replace(first, findings=first.findings + beside) if beside else first
+
+
+def _at_once(first: Evidence, axes: tuple[Finding, ...]) -> tuple[Evidence, tuple[Finding, ...]]:
+    """The findings, but for so many that are wrong at once that none of them can be believed."""
+    wrong = [finding for finding in (*first.findings, *axes) if finding.wrong]
+    if len(wrong) < MANY:
+        return first, axes
+    shown = ", ".join(f"{finding.name} {finding.shown}" for finding in wrong)
+    mixed = Finding(
+        "figures that are wrong at once",
+        "at_once",
+        float(len(wrong)),
+        1.0,
+        0.0,
+        "1",
+        "all of the ride",
+        "surely wrong" if any(finding.verdict == "surely wrong" for finding in wrong) else "likely wrong",
+        f"no single mistake explains this ride ({shown}): mending these figures would only hide it",
+        field="imu",
+        remedy="look for what changes within the ride: a filter of the logger, an offset that drifts, parts "
+        "missing or in another order, two rides in one file, a device that came loose; or another track",
+    )
+    axes = tuple(_together(finding) for finding in axes)
+    findings = tuple(_together(finding) for finding in first.findings)
+    return replace(first, findings=(*findings, mixed)), axes
+
+
+def _together(finding: Finding) -> Finding:
+    """A finding that is wrong together with many others."""
+    if not finding.wrong:
+        return finding
+    why = "several figures are wrong at once"
+    return replace(finding, verdict="could not be judged", why=why, setting="", remedy="")
+
+
+def _cut(finding: Finding) -> Finding:
+    """A finding of an axis that is cut off: its factor follows from that."""
+    why = "the axis is cut off at the end of its range"
+    return replace(finding, rests_on="nothing", verdict="could not be judged", why=why, setting="", remedy="")
 
 
 def _unjudged(finding: Finding) -> Finding:

@@ -21,7 +21,7 @@ import numpy as np
 from simrail.core.columns import GYRO, MAGNETIC
 from simrail.core.jit import FloatArray
 from simrail.core.resample import rate_of
-from simrail.recording.evidence.finding import LIKELY, SURE, Finding, Verdict
+from simrail.recording.evidence.finding import Finding, verdict_of
 from simrail.recording.evidence.judge import KINDS
 from simrail.recording.recording import Recording
 
@@ -68,7 +68,7 @@ def weigh_field_clock(recording: Recording) -> tuple[Finding, ...]:
     value, sd, _ = found
     slack = CLOCK_SD_S + OWN_INTERVALS / rate_of(recording.imu.index.to_numpy())
     off = abs(value) / math.hypot(sd, slack)
-    verdict: Verdict = "surely wrong" if off > SURE else "likely wrong" if off > LIKELY else "sound"
+    verdict = verdict_of(off)
     why, setting = "", "magnetometer.time_offset_s"
     if verdict != "sound":
         side = "late" if value < 0.0 else "early"

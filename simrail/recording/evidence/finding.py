@@ -9,6 +9,11 @@ LIKELY, SURE = 3.5, 8.0
 """Standard deviations from which on a figure is likely wrong, and surely."""
 
 
+def verdict_of(off: float) -> Verdict:
+    """The judgement of a figure that is so many standard deviations off its nominal value."""
+    return "surely wrong" if off > SURE else "likely wrong" if off > LIKELY else "sound"
+
+
 @dataclass(frozen=True)
 class Finding:
     """One quantity, as a ride shows it, beside what the ride file says.

@@ -10,32 +10,46 @@ The residuals are no white noise. Each channel's noise is its variance times 1 +
 standard deviations weigh less (Huber).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple, Self
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
-from simrail.core.jit import FloatArray
+from simrail.core.jit import FloatArray, IntArray
 from simrail.recording.evidence.line import K3
 from simrail.recording.evidence.model import (
+    ACCEL_GAIN,
     CHANNELS,
+    CUTS,
     FORCE_X,
     FORCE_Y,
+    GAINS,
     GLOBALS,
     GYRO_X,
     GYRO_Y,
     GYRO_Z,
     INDEX,
+    LATES,
+    PACE,
+    RAMPS,
+    SINGLE,
+    SLOW,
     Motion,
     Ride,
     blocks_of,
-    expected,
     inside,
     motion,
+    start_values,
 )
+from simrail.recording.evidence.readings import readings, slopes
 
 ROUNDS = 15
 """Relinearisations at most; from a start near by, three or four are enough."""
+
+LESS_NOISE = 0.95
+"""Share of the noise that is left, above which nothing hid in it."""
 
 CORRELATED_S = 10.0
 """Time over which correlations of a residual are summed."""
@@ -44,7 +58,11 @@ OUTLIER = 3.0
 """Standard deviations from which on a residual weighs less."""
 
 FREE = {"wheel": 10.0, "shift": 3e3, "offset": 30.0, "drift": 1e-3, "gyro_offset": 30.0, "gyro": 30.0}
+FREE |= dict.fromkeys((*GAINS, PACE, ACCEL_GAIN, *LATES, *SLOW, *RAMPS, *CUTS), 30.0)
 """Prior sds of faults: so wide that they say nothing."""
+
+HELD = ("gyro_offset", *SINGLE, *RAMPS, *CUTS)
+"""Parameters that stay as they are where a fit does not set them free."""
 
 MOUNT_SD_RAD = 3.0
 """The same of a mounting angle."""
@@ -66,9 +84,6 @@ BEHIND_SD_M = 1.0
 
 SLUGGISH_SD_S = 0.5
 """How late a body on springs may roll and pitch; it turns about Z with the track."""
-
-STEPS = {"wheel": 1e-4, "shift": 0.05, "offset": 5e-3, "drift": 1e-6, "gyro_offset": 5e-3}
-"""Steps of the differences for the slopes; 1e-5 for the others."""
 
 STILL_MPS = 0.05
 """Slower than this in its mean, a block is one at rest."""
@@ -92,6 +107,12 @@ class Fit:
         Blocks at rest.
     noise : ndarray (2, 5)
         Noise of each channel, moving and at rest.
+    weights : ndarray (b, 5)
+        Weights of the blocks, below 1 for those that are far off.
+    left : ndarray (b, 5)
+        Residuals; nothing where the device of the way tells of none.
+    strain : float
+        Squares of what else is open, by its prior sds, summed.
     """
 
     x: FloatArray
@@ -100,6 +121,9 @@ class Fit:
     explained: FloatArray
     standing: np.ndarray
     noise: FloatArray
+    weights: FloatArray
+    left: FloatArray
+    strain: float
 
     def value(self, name: str) -> float:
         """A parameter."""
@@ -135,7 +159,14 @@ def prior_of(ride: Ride) -> FloatArray:
     return np.array([sds[name] for name in GLOBALS])
 
 
-def fit(ride: Ride, start: FloatArray, *, apart: bool = False, noise: FloatArray | None = None) -> Fit:
+def fit(
+    ride: Ride,
+    start: FloatArray,
+    *,
+    free: Sequence[str] = (),
+    noise: FloatArray | None = None,
+    rounds: int = ROUNDS,
+) -> Fit:
     """Fit a ride from a start near by.
 
     Parameters
@@ -144,75 +175,149 @@ def fit(ride: Ride, start: FloatArray, *, apart: bool = False, noise: FloatArray
         The blocks.
     start : ndarray (len(GLOBALS),)
         First values.
-    apart : bool
-        Whether gyro and accelerometer may have clocks of their own; else their offset stays as it is.
+    free : sequence of str
+        Which of `HELD` are solved for, too; the others stay as they are.
     noise : ndarray (2, 5), optional
         That of the channels, to begin with.
+    rounds : int
+        Relinearisations at most.
     """
-    nominal = np.array([1.0 if name in ("wheel", "gyro") else 0.0 for name in GLOBALS])
-    prior = prior_of(ride)
-    x = start.copy()
+    prior, x = prior_of(ride), start.copy()
     if noise is None:
         noise = np.array([0.01, 0.01, 0.01, 0.1, 0.1]) * np.ones((2, 1))
     weights = np.ones_like(ride.measured)
-    for round_ in range(ROUNDS):
-        seen = inside(ride, x)
-        model = expected(ride, x)
-        moved = motion(ride, x)
-        standing = np.abs(blocks_of(np.abs(moved.speed_mps))) < STILL_MPS
-        slopes = _slopes(ride, x, model)
-        if not apart:
-            slopes[:, :, INDEX["gyro_offset"]] = 0.0
-        beside, beside_sd = _nuisance(ride, slopes, _places(ride, x, moved), standing, apart=apart)
-        rest = ride.measured - model
-        jacobian = np.concatenate([slopes, beside], axis=2)
-        sds = np.concatenate([prior, beside_sd])
-        scale = noise[standing.astype(np.int64)]
-        weight = weights / scale**2 * seen[:, None]
-        flat, w = jacobian.reshape(-1, len(sds)), weight.ravel()
-        normal = (flat * w[:, None]).T @ flat + np.diag(1.0 / sds**2)
-        off = np.concatenate([nominal - x, np.zeros(len(beside_sd))])
-        solved = np.linalg.solve(normal, (flat * w[:, None]).T @ rest.ravel() + off / sds**2)
-        step = solved[: len(GLOBALS)]
-        left = rest - (jacobian @ solved)
-        x = x + np.clip(step, -_LONGEST, _LONGEST)
+    for round_ in range(rounds):
+        near = _near(ride, x, noise, weights, free)
+        here, seen, standing, count = near.solved_for, near.seen, near.standing, len(near.solved_for)
+        normal, right = near.normal()
+        solved = np.linalg.solve(normal, right)
+        step = solved[:count]
+        left = near.rest - (near.jacobian @ solved)
+        x[here] += np.clip(step, -_LONGEST[here], _LONGEST[here])
         noise, weights = _noise(ride, left, standing, seen)
-        done = bool(np.all(np.abs(step) < 0.01 * np.sqrt(np.diag(np.linalg.inv(normal))[: len(GLOBALS)])))
+        done = bool(np.all(np.abs(step) < 0.01 * np.sqrt(np.diag(np.linalg.inv(normal))[:count])))
         if done and round_ >= 3:
             break
-    covariance = np.linalg.inv(normal)[: len(GLOBALS), : len(GLOBALS)]
+    covariance = np.diag(prior**2)
+    covariance[np.ix_(here, here)] = np.linalg.inv(normal)[:count, :count]
+    strain = float(np.sum(((solved - near.off) / near.sds) ** 2))
     moving = ~standing & seen
     explained = np.zeros(CHANNELS)
     if moving.sum() >= 4:
         total = ride.measured[moving] - ride.measured[moving].mean(axis=0)
         explained = 1.0 - (left[moving] ** 2).sum(axis=0) / np.maximum((total**2).sum(axis=0), 1e-30)
     sizes = np.where(seen[:, None], np.minimum(np.abs(left / _CLASS), OUTLIER), 0.5)
-    return Fit(x, covariance, float(np.mean(sizes**2)), explained, standing, noise)
+    cost, left = float(np.mean(sizes**2)), left * seen[:, None]
+    return Fit(x, covariance, cost, explained, standing, noise, weights, left, strain)
+
+
+class _Near(NamedTuple):
+    """A ride near some parameters, as linear in what is solved for.
+
+    Attributes
+    ----------
+    solved_for : ndarray (m,)
+        Which parameters; behind them come what the map and the rails may be wrong, k in all.
+    jacobian : ndarray (b, 5, k)
+        Slopes of the readings.
+    rest : ndarray (b, 5)
+        Measured less expected.
+    weight : ndarray (b, 5)
+        Over squares of the noise.
+    sds, off : ndarray (k,)
+        Prior sds, and how far from here their means are.
+    seen, standing : ndarray (b,)
+        Blocks of which the device of the way tells; blocks at rest.
+    """
+
+    solved_for: IntArray
+    jacobian: FloatArray
+    rest: FloatArray
+    weight: FloatArray
+    sds: FloatArray
+    off: FloatArray
+    seen: np.ndarray
+    standing: np.ndarray
+
+    def only(self, columns: IntArray) -> Self:
+        """The same with some of what is solved for, in that order."""
+        return self._replace(
+            jacobian=self.jacobian[:, :, columns], sds=self.sds[columns], off=self.off[columns]
+        )
+
+    def weighed(self, noise: FloatArray, weights: FloatArray) -> Self:
+        """The same with another noise."""
+        weight = weights / noise[self.standing.astype(np.int64)] ** 2 * self.seen[:, None]
+        return self._replace(weight=weight)
+
+    def normal(self) -> tuple[FloatArray, FloatArray]:
+        """Normal matrix (k, k) and right side (k,) of the posterior's mean."""
+        flat, w = self.jacobian.reshape(-1, len(self.sds)), self.weight.ravel()
+        weighted = (flat * w[:, None]).T
+        right = weighted @ self.rest.ravel() + self.off / self.sds**2
+        return weighted @ flat + np.diag(1.0 / self.sds**2), right
+
+
+def _near(ride: Ride, x: FloatArray, noise: FloatArray, weights: FloatArray, free: Sequence[str]) -> _Near:
+    solved_for = np.array([i for i, name in enumerate(GLOBALS) if name not in HELD or name in free])
+    seen, here, moved = inside(ride, x), readings(ride, x), motion(ride, x)
+    standing = np.abs(blocks_of(np.abs(moved.speed_mps))) < STILL_MPS
+    by_all = slopes(ride, x, here, solved_for)
+    beside, beside_sd = _nuisance(ride, by_all, _places(ride, x, moved), standing, free=free)
+    return _Near(
+        solved_for,
+        np.concatenate([by_all[:, :, solved_for], beside], axis=2),
+        ride.measured - here.expected,
+        weights / noise[standing.astype(np.int64)] ** 2 * seen[:, None],
+        np.concatenate([prior_of(ride)[solved_for], beside_sd]),
+        np.concatenate([(start_values() - x)[solved_for], np.zeros(len(beside_sd))]),
+        seen,
+        standing,
+    )
+
+
+def hints(
+    ride: Ride, found: Fit, names: Sequence[str], *, free: Sequence[str] = ()
+) -> dict[str, tuple[float, float]]:
+    """What a fit would find if one more parameter were free, and its sd: by one step from where it ended.
+
+    Parameters
+    ----------
+    ride : Ride
+        The blocks.
+    found : Fit
+        Of them.
+    names : sequence of str
+        Which of `HELD` may be free, one at a time.
+    free : sequence of str
+        Those that were free in the fit.
+    """
+    near = _near(ride, found.x, found.noise, found.weights, (*free, *names))
+    columns = {name: int(np.flatnonzero(near.solved_for == INDEX[name])[0]) for name in names}
+    others = np.setdiff1d(np.arange(len(near.sds)), list(columns.values()))
+    told = {}
+    for name, column in columns.items():
+        part = near.only(np.append(others, column))
+        # What is wrong makes noise of its own, and would hide behind it: the noise is taken again without it.
+        before = found.noise
+        for _ in range(3):
+            normal, right = part.normal()
+            inverse = np.linalg.inv(normal)
+            solved = inverse @ right
+            noise, weights = _noise(ride, part.rest - part.jacobian @ solved, part.standing, part.seen)
+            if np.all(noise > LESS_NOISE * before):
+                break
+            part, before = part.weighed(noise, weights), noise
+        told[name] = (found.value(name) + float(solved[-1]), float(np.sqrt(inverse[-1, -1])))
+    return told
 
 
 _CLASS = np.array([0.02, 0.02, 0.003, 0.05, 0.1])
 """Sizes of residuals by which two fits of one ride are compared."""
 
-_LONGEST = np.array(
-    [
-        {"wheel": 0.2, "shift": 60.0, "offset": 1.0, "drift": 2e-3, "gyro_offset": 1.0}.get(n, 1.0)
-        for n in GLOBALS
-    ]
-)
+_FAR = {"wheel": 0.2, "shift": 60.0, "drift": 2e-3, PACE: 0.2} | dict.fromkeys(CUTS, 0.1)
+_LONGEST = np.array([_FAR.get(name, 1.0) for name in GLOBALS])
 """Longest step of a round: a long one leaves where the model is nearly linear."""
-
-
-def _slopes(ride: Ride, x: FloatArray, model: FloatArray) -> FloatArray:
-    """Slopes (b, 5, len(GLOBALS)) of the expected readings."""
-    slopes = np.zeros((*model.shape, len(GLOBALS)))
-    for i, name in enumerate(GLOBALS[:-CHANNELS]):
-        step = STEPS.get(name, 1e-5)
-        other = x.copy()
-        other[i] += step
-        slopes[:, :, i] = (expected(ride, other) - model) / step
-    for channel in range(CHANNELS):
-        slopes[:, channel, len(GLOBALS) - CHANNELS + channel] = 1.0
-    return slopes
 
 
 class _Places(NamedTuple):
@@ -227,7 +332,8 @@ class _Places(NamedTuple):
 def _places(ride: Ride, x: FloatArray, moved: Motion) -> tuple[_Places, _Places]:
     """Those of the accelerometer and of the gyro."""
     found = []
-    for one in (moved, motion(ride, x, turns=True)) if x[INDEX["gyro_offset"]] else (moved,):
+    later = float(x[INDEX["gyro_offset"]])
+    for one in (moved, motion(ride, x, later_s=later)) if later else (moved,):
         place = blocks_of(one.place_m)
         line = ride.table.at(place)
         found.append(_Places(place, blocks_of(one.speed_mps), line[:, K3], line[:, K3 - 1]))
@@ -235,7 +341,12 @@ def _places(ride: Ride, x: FloatArray, moved: Motion) -> tuple[_Places, _Places]
 
 
 def _nuisance(
-    ride: Ride, slopes: FloatArray, places: tuple[_Places, _Places], standing: np.ndarray, *, apart: bool
+    ride: Ride,
+    slopes: FloatArray,
+    places: tuple[_Places, _Places],
+    standing: np.ndarray,
+    *,
+    free: Sequence[str],
 ) -> tuple[FloatArray, FloatArray]:
     """Slopes (b, 5, m) by what the map and the rails may be wrong, and its sds (m,)."""
     errors, table, recording = ride.recording.map_errors, ride.table, ride.recording
@@ -269,7 +380,13 @@ def _nuisance(
             column[first:last, channel] = gravity
             columns.append(column)
             sds.append(np.hypot(STOP_SD_RAD, errors.cant_along_sd_m / base))
-    if apart:
+    for _, last, way in ride.slides:
+        # Behind a slide the way of the wheel is off by what it lost.
+        column = slopes[:, :, INDEX["shift"]].copy()
+        column[:last] = 0.0
+        columns.append(column)
+        sds.append(max(way, 1.0))
+    if "gyro_offset" in free:
         # A body turns as at its middle, and pushes as at the device: that is a place, and no time.
         column = slopes[:, :, INDEX["shift"]].copy()
         column[:, FORCE_X:] = 0.0
@@ -314,10 +431,10 @@ def _noise(
         sd = np.maximum(np.sqrt(np.mean(clipped**2, axis=0)), floor)
         weights[flags] = np.minimum(1.0, OUTLIER * sd / np.maximum(np.abs(rest), 1e-12))
         most = min(lags, len(rest) // 4)
-        power = np.mean(clipped**2, axis=0)
-        longer = np.ones(CHANNELS)
-        for lag in range(1, most + 1):
-            with_lag = np.mean(clipped[lag:] * clipped[:-lag], axis=0) / np.maximum(power, 1e-30)
-            longer += 2.0 * (1.0 - lag / (most + 1.0)) * with_lag
+        lag = np.arange(most + 1)
+        later = sliding_window_view(np.vstack([clipped, np.zeros((most, CHANNELS))]), most + 1, axis=0)
+        with_lag = np.einsum("nc,ncl->cl", clipped, later) / (len(rest) - lag)
+        share = with_lag / np.maximum(with_lag[:, :1], 1e-30)
+        longer = share @ ((1.0 + (lag > 0)) * (1.0 - lag / (most + 1.0)))
         noise[kind] = sd * np.sqrt(np.maximum(longer, 1.0))
     return noise, weights

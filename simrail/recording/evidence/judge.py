@@ -15,17 +15,25 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from simrail.core.errors import InputError
-from simrail.recording.evidence.finding import LIKELY, SURE, Finding, Verdict
-from simrail.recording.evidence.fit import Fit
+from simrail.core.jit import FloatArray
+from simrail.recording.evidence.finding import LIKELY, Finding, Verdict, verdict_of
+from simrail.recording.evidence.fit import Fit, fit, hints
 from simrail.recording.evidence.line import K3
 from simrail.recording.evidence.model import (
+    CUTS,
+    GAINS,
     GYRO_Z,
     INDEX,
+    LATES,
+    PACE,
+    RAMPS,
     Motion,
     Ride,
     motion,
+    retimed,
     ride_of,
     start_values,
+    without_drift,
 )
 from simrail.recording.evidence.search import (
     LEAST_TURN_RAD,
@@ -33,8 +41,14 @@ from simrail.recording.evidence.search import (
     apart_fit,
     are_apart,
     best_fit,
-    clock_slack,
+    explains,
+    is_sound_start,
+    price,
 )
+from simrail.recording.evidence.single import WHOLE, WORTH, Single, left_over, weigh_single
+from simrail.recording.evidence.slack import accused, distance, slack_of
+from simrail.recording.evidence.slides import with_slides
+from simrail.recording.evidence.start import drift_by_turns, pace_by_turns
 from simrail.recording.recording import Recording
 
 FOLLOWED = 0.5
@@ -48,6 +62,15 @@ SURE_TURN_RAD = 0.3
 
 SPEEDS_TAKEN = {"km/h": 1.0 / 3.6, "miles an hour": 0.44704, "knots": 0.51444, "feet a second": 0.3048}
 """Units that a speed in m/s may be in, in m/s, and how far a factor may be off one of them."""
+
+ROUNDS = 3
+"""Of a search for the pace of the stamps."""
+
+LESS = 0.9
+"""Share of what whole devices leave, that another pace of the stamps may leave at most to be believed."""
+
+MUCH = 1.0
+"""Cost of a fit from which on it leaves more than rails and bodies make: some 0.1 m/s2 and 1 deg/s."""
 
 LEAST_PUSH_MPS = 2.0
 """Changes of speed, summed, from which on the push says something."""
@@ -98,12 +121,15 @@ class Evidence:
         Turn of the track on the ride, and its changes of speed, both summed.
     middle_s : float
         Time from the first stamp of the device of the way to where the offset of its clock holds.
+    single : Single, optional
+        What it says of single axes, sensors and its time; the findings hold beside that.
     """
 
     findings: tuple[Finding, ...]
     turn_rad: float = 0.0
     push_mps: float = 0.0
     middle_s: float = 0.0
+    single: Single | None = None
 
     @property
     def wrong(self) -> tuple[Finding, ...]:
@@ -136,9 +162,8 @@ def weigh(recording: Recording) -> Evidence:
         return Evidence(tuple(_unjudged(key, math.inf, "nothing", why) for key in KINDS))
     # The matrices are small: threads of BLAS cost more than they bring.
     with threadpool_limits(1):
-        one = best_fit(ride)
-        two = apart_fit(ride, one)
-    best = two if are_apart(ride, one, two) else one
+        ride, fits = _explained(ride)
+    one, two, single, best = fits
     # Of three clocks that one is wrong that agrees with neither of the others.
     is_accel = best is two and accel_is_apart(ride, two)
     told = two.by_gyro() if is_accel else best
@@ -150,7 +175,7 @@ def weigh(recording: Recording) -> Evidence:
         "push": bool(push > LEAST_PUSH_MPS),
     }
     rests = {"turn": f"{turn / _DEG:.0f} deg of curves", "push": f"{push:.0f} m/s of changes of speed"}
-    slack = _slack(ride, best)
+    slack = slack_of(ride, best)
     findings = []
     for key, kind in KINDS.items():
         sources = [rests[by] for by in kind.by if has[by]]
@@ -169,32 +194,141 @@ def weigh(recording: Recording) -> Evidence:
         if best is one and key in ("gyro_offset", "offset", *ALIKE):
             finding = _beside_a_late_gyro(finding, two, slack[key])
         findings.append(finding)
+    if ride.drift:
+        findings = [_counted(finding, ride) if finding.key == "drift" else finding for finding in findings]
     middle = ride.middle_s - float(ride.way.time_s[0])
-    return Evidence(tuple(findings), turn, float(push), middle)
+    return Evidence(tuple(findings), turn, float(push), middle, single)
 
 
-def _slack(ride: Ride, found: Fit) -> dict[str, float]:
-    """How far from its nominal value each may be in a sound ride, besides the fit's own sd; in SI."""
-    recording = ride.recording
-    sheet, errors = recording.imu_sheet, recording.map_errors
-    package = sheet.package_misalignment_rad / math.sqrt(3.0)
-    moved = motion(ride, found.x)
-    curves = max(1, len(ride.table.curves_in(float(moved.place_m.min()), float(moved.place_m.max()))))
-    seconds = float(ride.fine_s[-1] - ride.fine_s[0])
-    clock = 0.02 + 0.02 * ride.reading_s
-    return {
-        "gyro": math.hypot(
-            sheet.gyro_scale_error / math.sqrt(3.0), errors.radius_relative_sd / math.sqrt(curves), 0.003
-        ),
-        "wheel": math.hypot(ride.way.scale_sd, errors.chainage_scale_sd, 0.001),
-        "shift": math.hypot(errors.chainage_offset_sd_m, 2.0),
-        "yaw": math.hypot(package, 0.3 * _DEG),
-        "pitch": math.hypot(package, errors.gradient_sd, 0.2 * _DEG),
-        "roll": math.hypot(package, errors.cant_along_sd_m / recording.track.rail_base_m, 0.2 * _DEG),
-        "offset": clock,
-        "gyro_offset": clock_slack(ride),
-        "drift": math.hypot(sheet.clock_drift, 0.03 / seconds, 3e-5),
-    }
+def is_near_sound(recording: Recording) -> bool:
+    """Whether a ride is explained from near a sound ride's values: one fit of it, before all others."""
+    ride = ride_of(recording)
+    if ride is None:
+        return False
+    with threadpool_limits(1):
+        return is_sound_start(ride, fit(ride, start_values()))
+
+
+class _Fits(NamedTuple):
+    """Fits of a ride: one clock in the IMU, two, faults of single axes; and the one that is believed."""
+
+    one: Fit
+    two: Fit
+    single: Single
+    best: Fit
+
+    @property
+    def is_apart(self) -> bool:
+        """Whether that with two clocks is believed."""
+        return self.best is self.two
+
+    def blamed(self, ride: Ride) -> int:
+        """How many figures it says are wrong."""
+        accuses = accused(self.best, slack_of(ride, self.best), WHOLE)
+        return accuses + len(self.single.free) + self.is_apart
+
+    def price(self, ride: Ride, noise: FloatArray) -> float:
+        """What the believed one leaves by a noise (2, 5), and what it blames."""
+        return left_over(self.best, noise) + WORTH * (self.blamed(ride) + len(ride.slides))
+
+
+def _explained(ride: Ride) -> tuple[Ride, _Fits]:
+    """A ride and its fits; by other stamps, or without what its wheel says while it slides, if that is it."""
+    one = best_fit(ride)
+    two = apart_fit(ride, one)
+    if _is_suspect(ride, one) or are_apart(ride, one, two):
+        pace = pace_by_turns(ride)
+        paced = None if pace is None else _paced(ride, pace, one)
+        if paced is not None:
+            return paced
+        drift = drift_by_turns(ride)
+        undrifted = None if drift is None else _undrifted(ride, drift, one)
+        if undrifted is not None:
+            return undrifted
+        unsteady = _unsteady(ride, one)
+        if unsteady is not None:
+            return ride, unsteady
+    fits = _fits(ride, one, two)
+    slid = with_slides(ride) if fits.blamed(ride) else None
+    if slid is None or not is_sound_start(slid, fit(slid, start_values())):
+        return ride, fits
+    others = _fits_of(slid)
+    noise = others.best.noise
+    return (slid, others) if others.price(slid, noise) < fits.price(ride, noise) else (ride, fits)
+
+
+def _is_suspect(ride: Ride, one: Fit) -> bool:
+    """Whether a fit of whole devices blames one, or leaves much, or leaves more and more."""
+    slack = slack_of(ride, one)
+    if accused(one, slack, WHOLE) or not explains(ride, one) or one.cost > MUCH:
+        return True
+    grows = hints(ride, one, RAMPS)
+    return any(distance(name, *told, slack[name]) > LIKELY for name, told in grows.items())
+
+
+def _paced(ride: Ride, pace: float, one: Fit) -> tuple[Ride, _Fits] | None:
+    """A ride whose stamps have another pace, and its fits by stamps that are set right; None if it has not.
+
+    How rough a way is, and how long a block, is said in seconds: by stamps of another pace they are wrong.
+    Gravity does not grow with the pace, what curves push does with its square, and what a gyro turns with
+    itself: a gyro of another factor leaves the push, and what cant and curves leave, unexplained.
+    """
+    sd, other = math.inf, ride
+    for _ in range(ROUNDS):
+        set_right = ride_of(retimed(ride.recording, pace)) if pace > 0.0 else None
+        if set_right is None:
+            return None
+        found = fit(set_right, start_values(), free=(PACE,))
+        pace, sd, other = pace * found.value(PACE), pace * found.sd(PACE), set_right
+        if abs(pace - 1.0) < LIKELY * sd:
+            return None
+    if not is_sound_start(other, found) or price(found) > LESS * price(one):
+        return None
+    again = _fits_of(other)
+    single = again.single
+    if again.blamed(other):
+        return None
+    single = replace(single, free=(PACE, *single.free), told=single.told | {PACE: (pace, sd)})
+    return other, again._replace(single=single)
+
+
+def _undrifted(ride: Ride, drift: float, one: Fit) -> tuple[Ride, _Fits] | None:
+    """A ride whose way has a clock that drifts by per cents, and its fits without; None if it has not."""
+    for of_imu in (True, False):
+        other = ride_of(without_drift(ride.recording, drift, of_imu=of_imu))
+        first = None if other is None else fit(other, start_values())
+        if not other or not first or not is_sound_start(other, first) or price(first) > LESS * price(one):
+            continue
+        again = _fits_of(other)
+        if not again.blamed(other):
+            return replace(other, drift=drift, of_imu=of_imu), again
+    return None
+
+
+def _unsteady(ride: Ride, one: Fit) -> _Fits | None:
+    """Fits of a ride of a sensor whose offset grows, or that takes off what is slow; None if it does not."""
+    for names in (RAMPS, *((cut,) for cut in CUTS)):
+        found = fit(ride, start_values(), free=names)
+        slack = slack_of(ride, found)
+        if accused(found, slack, WHOLE) or not explains(ride, found) or price(found) > LESS * price(one):
+            continue
+        told = {name: (found.value(name), found.sd(name)) for name in names}
+        free = tuple(name for name in names if distance(name, *told[name], slack[name]) > LIKELY)
+        if free:
+            told |= hints(ride, found, [*GAINS, *LATES], free=names)
+            return _Fits(found, found, Single(found, free, told, slack), found)
+    return None
+
+
+def _fits_of(ride: Ride) -> _Fits:
+    one = best_fit(ride)
+    return _fits(ride, one, apart_fit(ride, one))
+
+
+def _fits(ride: Ride, one: Fit, two: Fit) -> _Fits:
+    is_apart = are_apart(ride, one, two)
+    single = weigh_single(ride, one, two, is_apart=is_apart)
+    return _Fits(one, two, single, single.found if single.free else two if is_apart else one)
 
 
 def _judged(key: str, found: Fit, slack: float, rests_on: str, ride: Ride) -> Finding:
@@ -203,8 +337,7 @@ def _judged(key: str, found: Fit, slack: float, rests_on: str, ride: Ride) -> Fi
     value, sd = found.value(key), found.sd(key)
     if key in ("yaw", "pitch", "roll"):
         value = math.remainder(value, 2.0 * math.pi)
-    off = abs(value - nominal) / math.hypot(sd, slack)
-    verdict: Verdict = "surely wrong" if off > SURE else "likely wrong" if off > LIKELY else "sound"
+    verdict = verdict_of(abs(value - nominal) / math.hypot(sd, slack))
     why, remedy = "", ""
     setting, field = setting_of(key, ride.recording, ride.way.device)
     if verdict != "sound":
@@ -279,6 +412,27 @@ def _beside_a_late_gyro(finding: Finding, two: Fit, slack: float) -> Finding:
         other = f"{_late('gyro', seconds, 'accelerometer')} (this ride does not tell): set {OF_GYRO}"
         finding = replace(finding, remedy="; or ".join(part for part in (finding.remedy, other) if part))
     return finding
+
+
+def _counted(finding: Finding, ride: Ride) -> Finding:
+    """The finding of a drift by per cents: of stamps that were counted at another rate than the device's."""
+    drift, device = ride.drift + 1e-6 * finding.value, ride.way.device
+    wrong, right = ("IMU", device) if ride.of_imu else (device, "IMU")
+    remedy = f"give {wrong} and {right} the stamps of one clock"
+    if ride.of_imu:
+        rate = ride.recording.imu_sheet.rate_hz
+        remedy += (
+            f"; if samples were counted, their rate was {rate:.4g} Hz, or {abs(drift):.1%} of them are lost"
+        )
+    return replace(
+        finding,
+        value=1e6 * drift,
+        verdict="surely wrong",
+        why=f"the stamps of the {wrong} drift by {abs(drift):.1%} against the {right}'s, by the curves",
+        setting="",
+        field="imu.time_s" if ride.of_imu else f"{device}.time_s",
+        remedy=remedy,
+    )
 
 
 def _of_the_accelerometer(finding: Finding) -> Finding:

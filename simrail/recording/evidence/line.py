@@ -11,8 +11,8 @@ from simrail.track.design import Curve, TrackDesign
 STEP_M, MOST_ROWS = 0.25, 200_000
 """Step of the table, and its longest."""
 
-ROLL, PITCH, K1, K2, K3 = range(5)
-"""Columns: angles of the track frame, and its Darboux curvatures."""
+K1, K2, K3, ALONG, LEVEL, UP = range(6)
+"""Columns: Darboux curvatures of the track frame, and the share of upward gravity along its X, Y and Z."""
 
 
 @dataclass(frozen=True)
@@ -23,8 +23,8 @@ class MapTable:
     ----------
     first_m, step_m : float
         Place of the first row, and distance of rows.
-    rows : ndarray (n, 5)
-        Roll, pitch, and the three Darboux curvatures.
+    rows : ndarray (n, 6)
+        The three Darboux curvatures, and the three shares of what gravity pushes.
     joints_m : ndarray (j,)
         Places where two elements meet, in the range.
     bends : ndarray (m, 2)
@@ -40,7 +40,7 @@ class MapTable:
     curves: IntArray
 
     def at(self, place_m: FloatArray) -> FloatArray:
-        """Columns (n, 5) at places (n,); beyond the table those of its ends."""
+        """Columns (n, 6) at places (n,); beyond the table those of its ends."""
         at = np.clip((place_m - self.first_m) / self.step_m, 0.0, len(self.rows) - 1.000001)
         row = at.astype(np.int64)
         share = (at - row)[:, None]
@@ -79,7 +79,9 @@ def map_table(track: TrackDesign, low_m: float, high_m: float) -> MapTable:
     step = max(STEP_M, (high_m - low_m) / MOST_ROWS)
     places = low_m + step * np.arange(int(np.ceil((high_m - low_m) / step)) + 2)
     frame = track.frame_extended(places)
-    rows = np.column_stack([frame.roll_rad, frame.pitch_rad, frame.k])
+    level = np.cos(frame.pitch_rad)
+    shares = (-np.sin(frame.pitch_rad), level * np.sin(frame.roll_rad), level * np.cos(frame.roll_rad))
+    rows = np.column_stack([frame.k, *shares])
     curves = [i for i, element in enumerate(track.elements) if isinstance(element, Curve)]
     starts = np.asarray(element_starts(track.elements, track.start_m), dtype=np.float64)
     return MapTable(low_m, step, rows, starts, np.array(curves, dtype=np.int64))

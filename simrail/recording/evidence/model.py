@@ -17,18 +17,23 @@ and the device, whose axes are turned against those that were claimed by R(roll,
 
 the turns of the time t + gyro_offset where the clock of the gyro is another than the accelerometer's.
 
+Faults of one axis, one sensor or the time itself are parameters too, each of which stays at its sound value
+unless a fit sets it free: a gain of one channel, a channel that is late alone, a sensor behind a low-pass of
+the first order, a factor of the accelerometer, and a pace: stamps of which one unit is no second, so V and A
+are pace and pace^2 times what they are by the stamps, while the way stays.
+
 Not here: motion of the body in the track, which averages out or is noise, and the height of the mount.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
+import pandas as pd
 
 from simrail.core.columns import ACCEL, GYRO
 from simrail.core.jit import FloatArray
-from simrail.core.rotation import rotation_matrix
-from simrail.recording.evidence.line import K1, K3, PITCH, ROLL, MapTable, map_table
+from simrail.recording.evidence.line import MapTable, map_table
 from simrail.recording.evidence.way import Way, way_of
 from simrail.recording.recording import Recording
 
@@ -40,6 +45,22 @@ FINE = 5
 
 MARGIN_M = 600.0
 """How far beyond the ride the map is looked at."""
+
+CHANNELS = 5
+GYRO_X, GYRO_Y, GYRO_Z, FORCE_X, FORCE_Y = range(CHANNELS)
+
+OF_CHANNEL = (*GYRO, *ACCEL[:2])
+"""Columns of the IMU that the channels are."""
+
+GAINS, LATES = (tuple(f"{what}_{name}" for name in OF_CHANNEL) for what in ("gain", "late"))
+SLOW, PACE, ACCEL_GAIN = ("slow_gyro", "slow_accel"), "pace", "accel"
+
+SINGLE = (*GAINS, *LATES, *SLOW, PACE, ACCEL_GAIN)
+"""Parameters of a fault of one axis, one sensor or the time: each free only where it is asked for."""
+
+RAMPS, CUTS = tuple(f"ramp_{name}" for name in OF_CHANNEL), ("cut_gyro", "cut_accel")
+"""Parameters of a sensor that is not steady: how far the offset of a channel grows in the ride; and the
+corner, in rad/s, of a high-pass of the first order."""
 
 GLOBALS = (
     "wheel",
@@ -54,6 +75,9 @@ GLOBALS = (
     "squat",
     "lean",
     "stretch",
+    *SINGLE,
+    *RAMPS,
+    *CUTS,
     "gyro_bias_x",
     "gyro_bias_y",
     "gyro_bias_z",
@@ -64,11 +88,8 @@ GLOBALS = (
 
 INDEX = {name: i for i, name in enumerate(GLOBALS)}
 
-NOMINAL = {"wheel": 1.0, "gyro": 1.0}
+NOMINAL = {"wheel": 1.0, "gyro": 1.0, PACE: 1.0, ACCEL_GAIN: 1.0} | dict.fromkeys(GAINS, 1.0)
 """Of parameters whose sound value is not 0."""
-
-CHANNELS = 5
-GYRO_X, GYRO_Y, GYRO_Z, FORCE_X, FORCE_Y = range(CHANNELS)
 
 
 @dataclass(frozen=True)
@@ -89,6 +110,14 @@ class Ride:
         Means of the five channels.
     block_s : float
         Length of a block.
+    slides : tuple of (int, int, float)
+        First and last block of each slide of the wheel, and the way that it may have cost, m.
+    slid : ndarray (b,), optional
+        Blocks in which the wheel slides; none if nothing is said.
+    drift : float
+        What has been taken off the clock of the device of the way against the IMU's, from its first stamp on.
+    of_imu : bool
+        Whether by the stamps of the IMU.
     """
 
     recording: Recording
@@ -97,6 +126,15 @@ class Ride:
     fine_s: FloatArray
     measured: FloatArray
     block_s: float
+    slides: tuple[tuple[int, int, float], ...] = ()
+    slid: np.ndarray | None = None
+    drift: float = 0.0
+    of_imu: bool = False
+
+    @cached_property
+    def told(self) -> FloatArray:
+        """Way and its derivatives (n, 3), as the device of the way tells them."""
+        return np.column_stack([self.way.way_m, self.way.speed_mps, self.way.acceleration_mps2])
 
     @property
     def reading_s(self) -> float:
@@ -108,6 +146,36 @@ class Ride:
     def middle_s(self) -> float:
         """Time from which the drift of a clock is counted."""
         return float(0.5 * (self.fine_s[0] + self.fine_s[-1]))
+
+
+def retimed(recording: Recording, pace: float) -> Recording:
+    """A recording with stamps that ran `pace` times too fast set right; devices of the evidence alone."""
+    frames = {}
+    for name in ("imu", "encoder", "odometer", "odometry"):
+        frame = getattr(recording, name)
+        if frame is not None:
+            index = pd.Index(frame.index.to_numpy(dtype=np.float64) / pace, name="time_s")
+            frames[name] = frame.set_axis(index, axis=0)
+    sheet = recording.imu_sheet
+    sheet = replace(sheet, rate_hz=sheet.rate_hz * pace, lag_s=sheet.lag_s / pace)
+    return replace(recording, imu_sheet=sheet, **frames)
+
+
+def without_drift(recording: Recording, drift: float, *, of_imu: bool) -> Recording:
+    """A recording whose way has a clock that drifts against the IMU's from its first stamp on, set right.
+
+    By the stamps of the IMU, which another rate counted, or else by those of the device of the way.
+    """
+    way = {name: getattr(recording, name) for name in ("encoder", "odometer", "odometry")}
+    frames = {name: frame for name, frame in way.items() if frame is not None}
+    first, factor = float(next(iter(frames.values())).index[0]), 1.0 / (1.0 - drift)
+    if of_imu:
+        frames, factor = {"imu": recording.imu}, 1.0 - drift
+    for name, frame in frames.items():
+        stamps = first + factor * (frame.index.to_numpy(dtype=np.float64) - first)
+        frames[name] = frame.set_axis(pd.Index(stamps, name="time_s"), axis=0)
+    rate = recording.imu_sheet.rate_hz / (factor if of_imu else 1.0)
+    return replace(recording, imu_sheet=replace(recording.imu_sheet, rate_hz=rate), **frames)
 
 
 def ride_of(recording: Recording) -> Ride | None:
@@ -122,7 +190,7 @@ def ride_of(recording: Recording) -> Ride | None:
     if count < 8:
         return None
     # A sample stands for the interval around its stamp: sums up to the ends of those intervals.
-    signals = recording.imu[[*GYRO, *ACCEL[:2]]].to_numpy(dtype=np.float64)
+    signals = recording.imu[[*OF_CHANNEL]].to_numpy(dtype=np.float64)
     ends = np.concatenate([stamps - 0.5 / rate, [stamps[-1] + 0.5 / rate]])
     sums = np.vstack([np.zeros(CHANNELS), np.cumsum(signals, axis=0)]) / rate
     edges = stamps[0] + block_s * np.arange(count + 1)
@@ -152,73 +220,46 @@ def start_values() -> FloatArray:
     return np.array([NOMINAL.get(name, 0.0) for name in GLOBALS])
 
 
-def motion(ride: Ride, x: FloatArray, *, turns: bool = False) -> Motion:
-    """How the train moved, for parameters (len(GLOBALS),), at the stamps of the accelerometer or the gyro."""
-    wheel, shift, offset, drift = x[:4]
-    way = ride.way
-    when = ride.fine_s + x[INDEX["gyro_offset"]] if turns else ride.fine_s
+def when_of(ride: Ride, x: FloatArray, *, later_s: float = 0.0) -> FloatArray:
+    """Way, and its derivatives (b * FINE, 3), some time after the stamps of the accelerometer."""
+    offset, drift = x[INDEX["offset"]], x[INDEX["drift"]]
+    way, when = ride.way, ride.fine_s + later_s
     times = when - offset - drift * (when - ride.middle_s)
     # Uniform times: the cell of each is found without a search.
     at = np.clip((times - way.time_s[0]) / way.step_s, 0.0, len(way.time_s) - 1.000001)
     cell = at.astype(np.int64)
-    share = at - cell
+    first = ride.told[cell]
+    told: FloatArray = first + (at - cell)[:, None] * (ride.told[cell + 1] - first)
+    return told
 
-    def of(values: FloatArray) -> FloatArray:
-        between: FloatArray = values[cell] + share * (values[cell + 1] - values[cell])
-        return between
 
-    place = ride.recording.start_position_m + shift + wheel * of(way.way_m)
-    return Motion(place, wheel * of(way.speed_mps), wheel * of(way.acceleration_mps2))
+def motion_of(ride: Ride, x: FloatArray, told: FloatArray) -> Motion:
+    """How the train moved, for parameters (len(GLOBALS),), of what the way says (b * FINE, 3)."""
+    wheel, shift, pace = x[INDEX["wheel"]], x[INDEX["shift"]], x[INDEX[PACE]]
+    place = ride.recording.start_position_m + shift + wheel * told[:, 0]
+    return Motion(place, wheel * pace * told[:, 1], wheel * pace**2 * told[:, 2])
+
+
+def motion(ride: Ride, x: FloatArray, *, later_s: float = 0.0) -> Motion:
+    """How the train moved some time after the stamps of the accelerometer, for parameters (len(GLOBALS),)."""
+    return motion_of(ride, x, when_of(ride, x, later_s=later_s))
+
+
+def laters(x: FloatArray) -> FloatArray:
+    """How far (5,) after the stamps the motion is that each channel shows, s."""
+    later = x[[INDEX[name] for name in LATES]].copy()
+    later[: GYRO_Z + 1] += x[INDEX["gyro_offset"]]
+    return later
 
 
 def inside(ride: Ride, x: FloatArray) -> np.ndarray:
     """Blocks (b,) of which the device of the way tells, for a clock of that offset."""
     times = ride.fine_s[::FINE] - x[INDEX["offset"]]
-    time, apart = ride.way.time_s, x[INDEX["gyro_offset"]]
-    seen: np.ndarray = (times + min(apart, 0.0) >= time[0]) & (
-        times + max(apart, 0.0) + ride.block_s <= time[-1]
+    time, apart = ride.way.time_s, laters(x)
+    seen: np.ndarray = (times + min(apart.min(), 0.0) >= time[0]) & (
+        times + max(apart.max(), 0.0) + ride.block_s <= time[-1]
     )
-    return seen
-
-
-def expected(ride: Ride, x: FloatArray) -> FloatArray:
-    """Means of the five channels (b, 5) that parameters (len(GLOBALS),) let expect."""
-    by = dict(zip(GLOBALS, x, strict=True))
-    moved, gravity = motion(ride, x), ride.recording.gravity_mps2
-    line = ride.table.at(moved.place_m)
-    speed, push = moved.speed_mps, moved.acceleration_mps2
-    level = np.cos(line[:, PITCH])
-    beside = _beside(line, speed, gravity)
-    rate = _rates(ride, by, moved, line)
-    if by["gyro_offset"]:
-        turned = motion(ride, x, turns=True)
-        rate = _rates(ride, by, turned, ride.table.at(turned.place_m))
-    along = push * (1.0 + by["squat"] + by["stretch"]) - gravity * np.sin(line[:, PITCH])
-    up = gravity * level * np.cos(line[:, ROLL]) - speed**2 * line[:, K1 + 1]
-    force = np.column_stack([along, beside * (1.0 + by["lean"]), up])
-    turn = rotation_matrix(np.array([[by["roll"], by["pitch"], by["yaw"]]]))[0]
-    read = np.empty((len(speed), CHANNELS))
-    read[:, :3] = by["gyro"] * (rate @ turn)
-    read[:, 3:] = (force @ turn)[:, :2]
-    means: FloatArray = read.reshape(-1, FINE, CHANNELS).mean(axis=1)
-    return means + x[-CHANNELS:]
-
-
-def _beside(line: FloatArray, speed: FloatArray, gravity: float) -> FloatArray:
-    """What curve and cant leave across the track (n,)."""
-    left: FloatArray = speed**2 * line[:, K3] + gravity * np.cos(line[:, PITCH]) * np.sin(line[:, ROLL])
-    return left
-
-
-def _rates(ride: Ride, by: Mapping[str, float], moved: Motion, line: FloatArray) -> FloatArray:
-    """Rates (n, 3) of the body at the times of a motion."""
-    gravity, step, speed = ride.recording.gravity_mps2, ride.block_s / FINE, moved.speed_mps
-    roll = by["lean"] * _beside(line, speed, gravity) / gravity
-    pitch = -by["squat"] * moved.acceleration_mps2 / gravity
-    rate: FloatArray = speed[:, None] * line[:, K1 : K3 + 1]
-    rate[:, 1] += roll * rate[:, 2] + np.gradient(pitch, step)
-    rate[:, 0] += np.gradient(roll, step)
-    return rate
+    return seen if ride.slid is None else seen & ~ride.slid
 
 
 def blocks_of(values: FloatArray) -> FloatArray:

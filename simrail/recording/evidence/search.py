@@ -12,6 +12,7 @@ import numpy as np
 from simrail.recording.evidence.finding import LIKELY, SURE
 from simrail.recording.evidence.fit import Fit, fit
 from simrail.recording.evidence.model import FORCE_X, GYRO_Z, INDEX, Ride, start_values
+from simrail.recording.evidence.slack import clock_slack
 from simrail.recording.evidence.start import scan, scan_turns
 
 EXPLAINED = 0.9
@@ -41,20 +42,24 @@ NO_DEARER, NO_MORE = 1.2, 1.005
 """So much of the other's price a fit with two clocks may have: it may blame one figure more, and leave no
 more, but for residuals that are weighed by others."""
 
-CLOCK_SD_S, CLOCK_SD_M = 0.1, 0.7
-"""Of a sound IMU, beside half an interval of its samples: what suspensions do to the turns of a body and to
-its push (bodies of six vehicles have up to 0.3 s), and a way, for the joints of a map and where it turns."""
+KNOWN_S = 1.0
+"""Standard deviation of a gyro's clock from which on a ride knows none of it, whatever its value."""
 
 
 def best_fit(ride: Ride) -> Fit:
     """The fit from the sound ride's values; from others too where it blames or leaves much."""
     first = fit(ride, start_values())
-    if _explains(ride, first) and not _blamed(first):
+    if is_sound_start(ride, first):
         return first
     fits = [first, *(fit(ride, x) for x in scan(ride))]
     # Whatever a fit blames has to pay for itself: a ride on other rails, the other way, may look much like
     # one whose gyro has the other sign.
-    return min(fits, key=_price)
+    return min(fits, key=price)
+
+
+def is_sound_start(ride: Ride, found: Fit) -> bool:
+    """Whether a fit explains the ride and blames nothing, so that no other start is tried."""
+    return explains(ride, found) and not _blamed(found)
 
 
 def _blamed(found: Fit) -> int:
@@ -65,14 +70,15 @@ def _blamed(found: Fit) -> int:
     )
 
 
-def _explains(ride: Ride, found: Fit) -> bool:
+def explains(ride: Ride, found: Fit) -> bool:
+    """Whether a fit explains what the gyro turns and what pushes, if there is any."""
     turning = float(np.abs(ride.measured[:, GYRO_Z]).mean() * ride.block_s * len(ride.measured))
     turns = turning < LEAST_TURN_RAD or found.explained[GYRO_Z] > EXPLAINED
     return bool(turns and found.explained[FORCE_X] > EXPLAINED)
 
 
-def _price(found: Fit) -> float:
-    """What a fit leaves, and what it blames."""
+def price(found: Fit) -> float:
+    """What a fit leaves, and what it blames: to compare fits of one ride."""
     return (found.cost + GOOD) * (1.0 + DEARER * _blamed(found))
 
 
@@ -86,28 +92,23 @@ def apart_fit(ride: Ride, one: Fit) -> Fit:
     one : Fit
         The best one with one clock.
     """
-    first = fit(ride, one.x, apart=True, noise=one.noise)
-    if _explains(ride, first) and not _blamed(first):
+    first = fit(ride, one.x, free=("gyro_offset",), noise=one.noise)
+    if is_sound_start(ride, first):
         return first
     fits = [first]
     for x in (one.x, start_values()):
         trial = scan_turns(ride, x)
         if trial is not None:
-            fits.append(fit(ride, trial, apart=True))
-    return min(fits, key=_price)
-
-
-def clock_slack(ride: Ride) -> float:
-    """How far the clocks of a sound IMU's sensors may be apart, s."""
-    fastest = max(float(np.abs(ride.way.speed_mps).max()), 0.1)
-    return math.hypot(CLOCK_SD_S, CLOCK_SD_M / fastest, 0.5 / ride.recording.imu_sheet.rate_hz)
+            fits.append(fit(ride, trial, free=("gyro_offset",)))
+    return min(fits, key=price)
 
 
 def are_apart(ride: Ride, one: Fit, two: Fit) -> bool:
     """Whether a fit with two clocks is to be believed, rather than that with one."""
-    off = abs(two.value("gyro_offset")) / math.hypot(two.sd("gyro_offset"), clock_slack(ride))
+    sd = two.sd("gyro_offset")
+    off = abs(two.value("gyro_offset")) / math.hypot(sd, clock_slack(ride))
     leaves_more = two.cost + GOOD > NO_MORE * (one.cost + GOOD)
-    return off > LIKELY and not leaves_more and _price(two) <= NO_DEARER * _price(one)
+    return sd < KNOWN_S and off > LIKELY and not leaves_more and price(two) <= NO_DEARER * price(one)
 
 
 def accel_is_apart(ride: Ride, two: Fit) -> bool:

@@ -8,7 +8,8 @@ second one's tells what those two are off against each other.
 import math
 from dataclasses import replace
 
-from simrail.recording.evidence.finding import LIKELY, SURE, Finding, Verdict
+from simrail.recording.evidence.axes import weigh_axes
+from simrail.recording.evidence.finding import Finding, Verdict, verdict_of
 from simrail.recording.evidence.judge import KINDS, Evidence, Kind, weigh
 from simrail.recording.recording import Recording, SecondImuSheet, second_alone
 
@@ -38,10 +39,17 @@ def weigh_second(recording: Recording, first: Evidence) -> tuple[Finding, ...]:
         return ()
     second = weigh(alone)
     findings = [_renamed(second.of(key)) for key in OWN]
-    findings.append(_spacing(first, second, recording, sheet))
-    findings.append(_clock("offset", first, second, sheet.clock_offset_sd_s))
-    findings.append(_clock("drift", first, second, sheet.imu.clock_drift))
-    return tuple(findings)
+    beside = [
+        _spacing(first, second, recording, sheet),
+        _clock("offset", first, second, sheet.clock_offset_sd_s),
+        _clock("drift", first, second, sheet.imu.clock_drift),
+    ]
+    # Slopes on a line that is met elsewhere, or at another time, say nothing of an axis.
+    is_single = second.single is not None and bool(second.single.free)
+    is_elsewhere = any(finding.verdict == "surely wrong" for finding in (*findings, *beside))
+    if is_single or not is_elsewhere:
+        findings += [_renamed(finding) for finding in weigh_axes(alone, second.single) if finding.wrong]
+    return (*findings, *beside)
 
 
 def _renamed(finding: Finding) -> Finding:
@@ -108,7 +116,7 @@ def _compared(
         nothing: Verdict = "could not be judged"
         return Finding(kind.name, key, nominal, sd, nominal, kind.unit, "nothing", nothing, told[0].why)
     off = abs(value - nominal) / math.hypot(sd, slack)
-    verdict: Verdict = "surely wrong" if off > SURE else "likely wrong" if off > LIKELY else "sound"
+    verdict = verdict_of(off)
     if verdict == "sound":
         why = ""
         if sd > kind.wanted:

@@ -28,6 +28,12 @@ FACTORS = (1.0, -1.0, 0.5, 2.0, 0.25, 4.0, 0.2, 5.0, 0.318, 3.14, 0.667, 1.5, 0.
 LEAST_PUSH = 0.05
 """Share of what else is left of the accelerometer that the push has to explain for its scan to be a start."""
 
+FOLLOWS, LEAST_PACE = 0.8, 0.02
+"""Share of the gyro's Z that curves explain where only their speed is wrong; and how far off that is."""
+
+DRIFTS, CLOSER = np.arange(-20, 21) * 0.005, 0.5
+"""Drifts that are tried: up to 10 %; and share of what a ride without leaves, that one may leave."""
+
 QUARTERS_RAD = (np.pi, 0.5 * np.pi, -0.5 * np.pi)
 """Angles at which devices are mounted that are not told of."""
 
@@ -64,7 +70,7 @@ def scan_turns(ride: Ride, x: FloatArray) -> FloatArray | None:
     for offset in TURN_OFFSETS_S:
         trial = x.copy()
         trial[INDEX["gyro_offset"]] = offset
-        moved = motion(ride, trial, turns=True)
+        moved = motion(ride, trial, later_s=float(offset))
         bend = blocks_of(ride.table.at(moved.place_m)[:, K3] * moved.speed_mps)
         off = bend - bend.mean()
         power = float(off @ off)
@@ -75,6 +81,50 @@ def scan_turns(ride: Ride, x: FloatArray) -> FloatArray | None:
             best, found = slope * slope * power, trial
             found[INDEX["gyro"]] = slope
     return found
+
+
+def pace_by_turns(ride: Ride) -> float | None:
+    """How many times as fast as the ride its stamps run, if they are why the gyro turns more than the track.
+
+    The way and so the curves are where they are by any stamps; the speed by which they are passed is not.
+    None where the gyro does not follow the curves, or as it should.
+    """
+    moved = motion(ride, start_values())
+    bend = blocks_of(ride.table.at(moved.place_m)[:, K3] * moved.speed_mps)
+    off, measured = bend - bend.mean(), ride.measured[:, GYRO_Z] - ride.measured[:, GYRO_Z].mean()
+    power = float(off @ off)
+    found = float(off @ measured) / power if power > 1e-6 else 0.0
+    follows = found * found * power > FOLLOWS * float(measured @ measured)
+    return found if follows and found > 0.0 and abs(found - 1.0) > LEAST_PACE else None
+
+
+def drift_by_turns(ride: Ride) -> float | None:
+    """Drift, from the first stamps on, of the clock of the way by which the gyro's Z fits the curves best.
+
+    None where it fits about as well without. A drift as of stamps that were counted at another rate moves the
+    end of a ride by seconds: no step of a fit leads there.
+    """
+    measured = ride.measured[:, GYRO_Z] - ride.measured[:, GYRO_Z].mean()
+    total = float(measured @ measured)
+    shares = []
+    for drift in DRIFTS:
+        moved = motion(ride, drifted(ride, float(drift)))
+        bend = blocks_of(ride.table.at(moved.place_m)[:, K3] * moved.speed_mps)
+        off = bend - bend.mean()
+        power, along = float(off @ off), float(off @ measured)
+        shares.append(along * along / (power * total) if power > 1e-6 and along > 0.0 else 0.0)
+    best = int(np.argmax(shares))
+    if best in (0, len(DRIFTS) - 1):
+        return None
+    better = 1.0 - shares[best] < CLOSER * (1.0 - shares[len(DRIFTS) // 2])
+    return float(DRIFTS[best]) if better and shares[best] > FOLLOWS else None
+
+
+def drifted(ride: Ride, drift: float) -> FloatArray:
+    """A sound ride's values (len(GLOBALS),), but for a drift that begins at the first stamps."""
+    x = start_values()
+    x[INDEX["drift"]], x[INDEX["offset"]] = drift, drift * (ride.middle_s - float(ride.way.time_s[0]))
+    return x
 
 
 def _by_push(ride: Ride) -> FloatArray | None:

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from simrail.core.atomic_files import write_whole
+from simrail.core.columns import ACCEL, GYRO
 from simrail.core.errors import InputError
 from simrail.core.rotation import euler_angles, rotation_matrix
 from simrail.core.toml_files import judge, label, read_toml, toml_text
@@ -85,6 +86,9 @@ def mended(data: dict[str, Any], evidence: Evidence) -> list[str]:
     for mark, table in (("", "imu"), ("second_", "second_imu")):
         if f"{mark}gyro" in wrong:
             _multiply(data, f"{table}.scale.gyro", 1.0 / wrong[f"{mark}gyro"].value, changes)
+        _scale_axes(data, table, wrong, mark, changes)
+        if f"{mark}accel" in wrong:
+            _multiply(data, f"{table}.scale.accel", 1.0 / wrong[f"{mark}accel"].value, changes)
         found = {key: wrong[f"{mark}{key}"].value for key in ANGLES if f"{mark}{key}" in wrong}
         if found:
             _turn(data, table, found, changes)
@@ -113,6 +117,26 @@ def mended(data: dict[str, Any], evidence: Evidence) -> list[str]:
         found_offset = wrong["magnetometer_offset"]
         _add(data, found_offset.setting, found_offset.value, changes)
     return changes
+
+
+def _scale_axes(
+    data: dict[str, Any], table: str, wrong: Mapping[str, Finding], mark: str, changes: list[str]
+) -> None:
+    """Factors of single columns, each that of the axis of the device which points along the body's."""
+    for kind, names in (("gyro", GYRO), ("accel", ACCEL)):
+        found = {
+            i: wrong[key].value for i, name in enumerate(names) if (key := f"{mark}alone_{name}") in wrong
+        }
+        if not found:
+            continue
+        setting, axes = f"{table}.scale.{kind}", data[table].get("axes", ["x", "y", "z"])
+        before = _table(data, setting).get(kind, 1.0)
+        factors = [float(factor) for factor in (before if isinstance(before, list) else 3 * [before])]
+        for axis, value in found.items():
+            column = "xyz".index(str(axes[axis]).removeprefix("-"))
+            factors[column] = float(f"{factors[column] / value:.6g}")
+        _table(data, setting)[kind] = factors
+        changes.append(f"{setting} = {factors} (before: {before})")
 
 
 def _mend_wheel(data: dict[str, Any], wheel: Finding, changes: list[str]) -> None:
@@ -154,8 +178,13 @@ def _set(data: dict[str, Any], setting: str, value: object, before: object, chan
 
 
 def _multiply(data: dict[str, Any], setting: str, factor: float, changes: list[str]) -> None:
-    before = float(_table(data, setting).get(setting.rpartition(".")[2], 1.0))
-    _set(data, setting, float(f"{before * factor:.6g}"), before, changes)
+    before = _table(data, setting).get(setting.rpartition(".")[2], 1.0)
+    if isinstance(before, list):
+        factors = [float(f"{one * factor:.6g}") for one in before]
+        _table(data, setting)[setting.rpartition(".")[2]] = factors
+        changes.append(f"{setting} = {factors} (before: {before})")
+        return
+    _set(data, setting, float(f"{float(before) * factor:.6g}"), float(before), changes)
 
 
 def _add(data: dict[str, Any], setting: str, value: float, changes: list[str]) -> None:

@@ -9,7 +9,7 @@ from collections.abc import Iterable
 from typing import Annotated, ClassVar, Self
 
 import numpy as np
-from pydantic import BeforeValidator, Field, field_validator, model_validator
+from pydantic import BeforeValidator, Field, PlainValidator, field_validator, model_validator
 
 from simrail.core.errors import InputError
 from simrail.recording.files.data_file import DataPart, near
@@ -38,6 +38,35 @@ Names = Annotated[tuple[str, ...], BeforeValidator(_as_tuple)]
 """Columns: one name, or number from 1 on, or an array of them."""
 
 Positive = Annotated[float, Field(gt=0.0)]
+
+
+def _factors(value: object) -> object:
+    """One factor above 0, or one for each column: of either sign, and not 0."""
+    each = value if isinstance(value, list | tuple) else [value]
+    numbers = [one for one in each if isinstance(one, int | float) and not isinstance(one, bool)]
+    if len(numbers) < len(each) or not numbers or not all(np.isfinite(numbers)) or 0.0 in numbers:
+        raise InputError(
+            "holds what is no factor",
+            value=value if isinstance(value, list | str | int | float) else str(value),
+            limit="a number above 0, or an array of numbers that are not 0, one for each column",
+            remedy="1.0 for a column that is right",
+        )
+    if each is value:
+        return tuple(float(one) for one in numbers)
+    if numbers[0] < 0.0:
+        raise InputError(
+            "has the other sign",
+            value=value if isinstance(value, int | float) else str(value),
+            limit="a number above 0",
+            remedy="for columns of the other sign give an array of one factor for each column",
+        )
+    return float(numbers[0])
+
+
+Factors = Annotated[float | tuple[float, ...], PlainValidator(_factors)]
+"""A factor of a quantity, or one of each of its columns."""
+
+
 Angle = Annotated[float, Field(ge=-180.0, le=180.0)]
 
 
@@ -64,7 +93,8 @@ class SignalPart(DataPart):
         Longest distance of two samples that is bridged; that of the ride file where nothing is said, and
         for devices slower than that, three of their intervals.
     scale : dict
-        Quantity -> factor on its values, for a device that is found to be off by one.
+        Quantity -> factor on its values, for a device that is found to be off by one; of a vector also an
+        array of three, one for each of its columns, of either sign.
     time_offset_s : float
         Seconds that are added to its stamps: negative for a device whose stamps are late.
     time_drift_ppm : float
@@ -81,7 +111,7 @@ class SignalPart(DataPart):
     rate_hz: Positive | None = None
     start_s: float = 0.0
     longest_gap_s: Annotated[float, Field(gt=0.0, le=600.0)] | None = None
-    scale: dict[str, Positive] = Field(default_factory=dict)
+    scale: dict[str, Factors] = Field(default_factory=dict)
     time_offset_s: Annotated[float, Field(ge=-LARGEST_OFFSET_S, le=LARGEST_OFFSET_S)] = 0.0
     time_drift_ppm: Annotated[float, Field(ge=-10_000.0, le=10_000.0)] = 0.0
 
@@ -105,7 +135,15 @@ class SignalPart(DataPart):
                         remedy=near(key, keys) or "remove it",
                     )
         scaled = [key for key, quantity in quantities.items() if not quantity.whole]
-        for key in self.scale:
+        for key, factors in self.scale.items():
+            if key in scaled and isinstance(factors, tuple) and len(factors) != len(quantities[key].columns):
+                raise InputError(
+                    "has another number of factors than columns",
+                    field=f"scale.{key}",
+                    value=list(factors),
+                    limit=f"one for all, or {len(quantities[key].columns)}",
+                    remedy="1.0 for a column that is right",
+                )
             if key not in scaled:
                 raise InputError(
                     "has no scale",

@@ -18,7 +18,7 @@ from simrail.core.resample import rate_of
 from simrail.core.rotation import rotation_matrix
 from simrail.core.toml_files import label
 from simrail.recording.check_samples import Bounds, Channel, check_samples
-from simrail.recording.files.as_mended import as_mended
+from simrail.recording.files.as_mended import as_mended, scaled
 from simrail.recording.files.data_file import DataFile, open_data, read_columns
 from simrail.recording.files.signal_part import TEXT_TIMES, SignalPart, VectorPart
 from simrail.recording.files.stamps import RideClock, mended
@@ -163,7 +163,7 @@ class SignalReader:
 
         self.places[table] = place
         file = label(rows.data.path)
-        scaled: dict[str, FloatArray] = {}
+        framed: dict[str, FloatArray] = {}
         for quantity in quantities:
             values = [
                 _si(_taken(column, kept), quantity, part, name, file, place)
@@ -174,10 +174,11 @@ class SignalReader:
                 channels = _channels(values, rows.names[quantity.key], quantity, part)
                 time = _taken(rows.time, kept)
                 check_samples(channels, quantity.key, bounds, time=time, where=place, file=file)
+            values = scaled(values, quantity.key, part)
             if isinstance(part, VectorPart) and len(values) == 3:
                 values = _turned(values, part)
-            scaled.update(zip(quantity.columns, values, strict=True))
-        frame = pd.DataFrame(scaled, copy=False)
+            framed.update(zip(quantity.columns, values, strict=True))
+        frame = pd.DataFrame(framed, copy=False)
         if not signal.timed:
             return as_mended(frame, part)
         if len(frame) < 3:
