@@ -223,6 +223,8 @@ def test_axes_are_judged_where_no_device_is_wrong_or_each_column_by_itself(
     monkeypatch.setattr(f"{place}.are_columns", lambda *_: columns)
     monkeypatch.setattr(f"{place}.weigh_second", lambda *_: (found("second"),))
     monkeypatch.setattr(f"{place}.weigh_field_clock", lambda *_: (found("clock"),))
+    monkeypatch.setattr(f"{place}.weigh_clipped", lambda *_: ())
+    monkeypatch.setattr(f"{place}.weigh_exchange", lambda *_: None)
     told = weigh_all(None)  # type: ignore[arg-type]
     assert [finding.verdict for finding in told.findings] == verdicts
 
