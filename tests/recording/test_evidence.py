@@ -109,6 +109,14 @@ def test_nothing_is_said_of_the_sound_ride(sound: Recording) -> None:
     refuse_wrong(evidence)
 
 
+def test_an_imu_far_ahead_on_its_body_turns_as_the_middle_does(sound: Recording) -> None:
+    """Twelve metres behind its place are too many for one in the middle, and what one twelve ahead shows."""
+    behind = PLANTS["shift"](sound, -12.0)
+    assert tell(weigh(behind)) == ["shift"]
+    _, lateral, height = sound.mount_position_m
+    assert not weigh(replace(behind, mount_position_m=(12.0, lateral, height))).wrong
+
+
 def test_what_is_surely_wrong_is_refused_and_what_is_likely_told(sound: Recording) -> None:
     with pytest.raises(InputError, match=r"imu.scale.gyro.*--write") as refused:
         refuse_wrong(weigh(PLANTS["gyro"](sound, 2.0)))

@@ -28,6 +28,9 @@ its push (bodies of six vehicles have up to 0.3 s), and a way, for the joints of
 GAIN_SD = 0.02
 """Relative, of one axis: what sway and the joints of the rails leave of a slope."""
 
+AHEAD_SHARE = 0.5
+"""Of the way from the middle of a body to its IMU: a body turns as at its middle, wherever its device is."""
+
 RAMP_SD_RADPS, RAMP_SD_MPS2, CUT_SD_RADPS = 2e-3, 0.05, 0.01
 """Of an offset, over a ride, beside what its sheet calls instability: warming up; and of the corner of a
 high-pass: one of 100 s."""
@@ -65,7 +68,7 @@ def slack_of(ride: Ride, found: Fit) -> dict[str, float]:
     slack = {
         "gyro": math.hypot(sheet.gyro_scale_error / math.sqrt(3.0), bent, 0.003),
         "wheel": math.hypot(ride.way.scale_sd, errors.chainage_scale_sd, 0.001),
-        "shift": math.hypot(errors.chainage_offset_sd_m, 2.0),
+        "shift": math.hypot(errors.chainage_offset_sd_m, 2.0, AHEAD_SHARE * recording.mount_position_m[0]),
         "yaw": math.hypot(package, 0.3 * _DEG),
         "pitch": math.hypot(package, errors.gradient_sd, 0.2 * _DEG),
         "roll": math.hypot(package, errors.cant_along_sd_m / recording.track.rail_base_m, 0.2 * _DEG),
