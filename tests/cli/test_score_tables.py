@@ -261,3 +261,15 @@ def test_tables_that_are_too_many_are_counted(scenario: Scenario) -> None:
     lines = shown(scenario, *many(2, mounts))
     assert sum(line.startswith("Attitude") for line in lines) == MOST_TABLES
     assert f"... and {len(mounts) - MOST_TABLES} more tables: see the report, or scores.csv" in lines
+
+
+@pytest.mark.parametrize(("rides", "told"), [(2, False), (MOST_TABLES + 1, True)])
+def test_ablations_of_many_kinds_of_ride_are_left_to_the_report(
+    scenario: Scenario, rides: int, told: bool
+) -> None:
+    table, cells = many(rides)
+    errs = table.assign(map="drawn", cell=table["cell"] + 100)
+    more = cells.assign(map="drawn", cell=cells["cell"] + 100, case=cells["case"] + 100)
+    lines = shown(scenario, pd.concat([table, errs]), pd.concat([cells, more]))
+    assert ("What the ablations change stands in the report." in lines) == told
+    assert any(line.startswith("What the map costs") for line in lines) == (not told)
