@@ -51,7 +51,7 @@ RAILS = (*JUDGED, "gauge")
 WIDEST = 80
 """Characters of a line that a table keeps to, however wide the terminal is."""
 
-MOST_TABLES = 4
+MOST_TABLES = 3
 """Cases that have a table each, and tables of more."""
 
 MOST_NAMES = 3
