@@ -30,6 +30,7 @@ from simrail.report.tables.methods import MethodStyle, attitude_methods, method_
 from simrail.report.tables.pivot import CASE_COLUMNS, Case, cases
 from simrail.report.tables.running import decay_words, running_words
 from simrail.report.words.ablations import state_words
+from simrail.report.words.verdicts import short_name
 from simrail.results import Results
 from simrail.scenario.build import bands_by_name
 from simrail.scoring.ablations import ABLATIONS, has_both, without_ablations
@@ -139,7 +140,7 @@ def _title(members: pd.DataFrame, *, with_vehicle: bool) -> str:
     more = f" and {len(rides) - MOST_NAMES} more" if len(rides) > MOST_NAMES else ""
     mount = f"{first['mount']} of {first['vehicle']}" if with_vehicle else first["mount"]
     return (
-        f"{', '.join(rides[:MOST_NAMES])}{more}: {_way(members)}, {first['imu']} on {mount}, "
+        f"{', '.join(rides[:MOST_NAMES])}{more}: {_way(members)}, {short_name(first['imu'])} on {mount}, "
         f"odometry: {first['odometry']}, {state_words(first.to_dict(), comma=', ')}"
     )
 

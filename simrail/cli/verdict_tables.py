@@ -24,7 +24,7 @@ from simrail.report.words.verdicts import (
 from simrail.results import Results
 from simrail.scenario.cells import first_cells
 from simrail.scenario.requirements import requirements_of
-from simrail.scoring.share import ENOUGH, NOT_ENOUGH
+from simrail.scoring.share import ENOUGH, NOT_ENOUGH, UNDECIDED
 from simrail.scoring.verdicts import imu_pairs
 
 _COLOURS = {ENOUGH: "green", NOT_ENOUGH: "red"}
@@ -75,14 +75,22 @@ def print_coarsest(console: Console, results: Results) -> None:
         own = rows[rows["estimator"] == best.name] if best is not None else rows[:0]
         enough = own.loc[own["verdict"] == ENOUGH, "imu"].astype(str).unique()
         coarsest = max(enough, key=lambda imu: grades[imu].gyro_bias_instability_radps, default=None)
-        words = (
-            "none of these is enough"
-            if coarsest is None
-            else f"{short_name(coarsest)} is the coarsest that is enough"
-        )
+        if coarsest is not None:
+            words = f"{short_name(coarsest)} is the coarsest that is enough"
+        else:
+            words = _none_enough(own)
         console.print(
             f"{rows['requirement'].iloc[0]}, on the {mount}: {words}", highlight=False, soft_wrap=True
         )
+
+
+def _none_enough(verdicts: pd.DataFrame) -> str:
+    """Where no IMU is enough: whether that is known, or open for want of devices."""
+    undecided = verdicts[verdicts["verdict"] == UNDECIDED]
+    if undecided.empty:
+        return "none of these is enough"
+    names = ", ".join(map(short_name, undecided["imu"].astype(str).unique()))
+    return f"open for {names}: {undecided['devices'].max()} devices do not show it, take more (--devices)"
 
 
 MOST_COMPARED = 3

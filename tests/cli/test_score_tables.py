@@ -12,6 +12,7 @@ import pytest
 from rich.console import Console
 
 from simrail.cli.score_tables import MOST_NAMES, MOST_TABLES, WIDEST, print_scores
+from simrail.cli.verdict_tables import _none_enough
 from simrail.scenario.scenario import Scenario, read_scenario
 from simrail.scoring.table import NO_SAMPLES, OK, QUANTITY_UNITS, SCORE_COLUMNS, TOO_SHORT, UNOBSERVABLE
 
@@ -277,3 +278,19 @@ def test_ablations_of_many_kinds_of_ride_are_left_to_the_report(
     lines = shown(scenario, pd.concat([table, errs]), pd.concat([cells, more]))
     assert ("What the ablations change stands in the report." in lines) == told
     assert any(line.startswith("What the map costs") for line in lines) == (not told)
+
+
+def test_a_sheet_of_ones_own_is_told_by_its_file(scenario: Scenario) -> None:
+    table, cells = many(1)
+    own = "/somewhere/far/away/my_imu.toml"
+    lines = shown(scenario, table.assign(imu=own), cells.assign(imu=own), width=200)
+    assert lines[0].startswith("ride0: 10 km/h backward, my_imu.toml on body,")
+
+
+def test_what_no_device_has_shown_is_open_and_no_verdict() -> None:
+    verdicts = pd.DataFrame(
+        {"imu": ["/a/one.toml", "two"], "verdict": ["not enough"] * 2, "devices": [20, 20]}
+    )
+    assert _none_enough(verdicts) == "none of these is enough"
+    verdicts.loc[0, "verdict"] = "not enough draws"
+    assert _none_enough(verdicts) == "open for one.toml: 20 devices do not show it, take more (--devices)"

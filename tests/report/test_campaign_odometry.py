@@ -13,7 +13,7 @@ from rich.console import Console
 from scipy import stats
 
 from simrail.cli.ablation_tables import print_odometries
-from simrail.report.campaign.odometry import odometry_draws, odometry_frames, page_tables
+from simrail.report.campaign.odometry import odometry_draws, odometry_frames, page_tables, row_words
 from simrail.scoring.table import SCORE_COLUMNS, as_score_table
 
 Scores = tuple[pd.DataFrame, pd.DataFrame]
@@ -178,3 +178,8 @@ def test_the_command_line_shows_them_in_80_columns(width: int) -> None:
     errs = next(row for row in rows if row[:3] == ["car", "axle", "errs"])
     rms = odometry_frames(*campaign())["odometry"]["position_rms_m"].iloc[0]
     assert errs[3] == f"{rms:.3f}" and errs[-1] == "16"
+
+
+def test_a_row_of_ones_own_sheet_is_called_by_its_file() -> None:
+    assert row_words("imu", "/somewhere/far/away/my_imu.toml") == "my_imu.toml"
+    assert row_words("imu", "lord_3dm_gx4_25") == "lord_3dm_gx4_25"

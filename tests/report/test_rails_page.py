@@ -330,7 +330,7 @@ def test_rails_as_designed_have_no_attitude_of_their_own(ran: Ran) -> None:
     assert [s.name for s in attitude_methods(ran.styles)] == ["smoother", "camera_free", "design_angles"]
     only_zero = [s for s in ran.styles if s.name != "design_angles"]
     assert [s.name for s in attitude_methods(only_zero)][-1] == "zero_track"
-    attitude = ran.page[ran.page.index("Against the truth") : ran.page.index("Rails. In bold")]
+    attitude = ran.page[ran.page.index("Against the truth") : ran.page.index("Errors of the rails</summary>")]
     assert "design angles" in attitude and "zero track" not in attitude
 
 

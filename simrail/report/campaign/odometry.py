@@ -15,6 +15,7 @@ import pandas as pd
 
 from simrail.report.tables.tables import NONE, Cell, Row, Table, number_cell, without_empty
 from simrail.report.words.ablations import value_words
+from simrail.report.words.verdicts import short_name
 from simrail.scoring.ablations import MAP, without_ablations
 from simrail.scoring.bootstrap import interval
 from simrail.scoring.table import DRAWN_MAP, EXACT_MAP, FULL
@@ -185,6 +186,8 @@ def row_words(name: str, value: object) -> str:
         return value_words(MAP, value)
     if value == "all":
         return {"speed_kmh": "all speeds", "direction": "both ways"}.get(name, "all")
+    if name == "imu":
+        return short_name(value)
     return f"{value:g} km/h" if name == "speed_kmh" else str(value)
 
 
