@@ -4,7 +4,7 @@ A few cases have a table each. Of many, those of one vehicle, IMU and odometry s
 and the most of their means: an average over unlike rides would say nothing.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import pandas as pd
@@ -148,13 +148,18 @@ def _title(members: pd.DataFrame, *, with_vehicle: bool) -> str:
 def _way(members: pd.DataFrame) -> str:
     """Speed and direction, or how many passes there are."""
     if "passes" in members:
-        passes = sorted(set(members["passes"]))
-        many = f"{'' if len(passes) == 1 else f'{passes[0]} to '}{passes[-1]} passes"
-        return many if passes[-1] > 1 else "one pass"
-    least, most = f"{members['speed_kmh'].min():.3g}", f"{members['speed_kmh'].max():.3g}"
+        passes = members["passes"]
+        return f"{_span(passes, 'g')} passes" if passes.max() > 1 else "one pass"
     directions = list(dict.fromkeys(members["direction"]))
-    speed = least if least == most else f"{least} to {most}"
-    return f"{speed} km/h {directions[0] if len(directions) == 1 else 'both ways'}"
+    way = directions[0] if len(directions) == 1 else "both ways"
+    return f"{_span(members['speed_kmh'], '.3g')} km/h {way}"
+
+
+def _span(values: Iterable[float], form: str, *, between: str = " to ") -> str:
+    """The least and the most of values, once where they look alike; "" for none."""
+    known = list(values)
+    ends = (min(known), max(known)) if known else ()
+    return between.join(dict.fromkeys(f"{end:{form}}" for end in ends))
 
 
 def _cases(
@@ -207,8 +212,7 @@ def _astray(every: Sequence[Case]) -> list[str]:
     known = [mean.value for mean in astray if mean.draws]
     if not known or name == "truth":
         return []
-    least, most = f"{min(known):.3g}", f"{max(known):.3g}"
-    return [f"the odometry's position error is {least if least == most else f'{least} to {most}'} m rms"]
+    return [f"the odometry's position error is {_span(known, '.3g')} m rms"]
 
 
 def _rails(console: Console, every: Sequence[Case], styles: list[MethodStyle], band: str) -> Table:
@@ -242,9 +246,7 @@ class _Column(NamedTuple):
     def words(self, every: Sequence[Case], style: MethodStyle, *, digits: int = 3) -> str:
         """Mean of a method over the draws of a case, or what those of several lie between; "-" for none."""
         means = [case.get(style.name, self.quantity, self.metric, **self.where) for case in every]
-        values = [mean.value for mean in means if mean.draws]
-        words = [f"{value:.{digits}f}" for value in ((min(values), max(values)) if values else ())]
-        return "\u2013".join(dict.fromkeys(words)) or "-"
+        return _span((m.value for m in means if m.draws), f".{digits}f", between="\u2013") or "-"
 
 
 def _table(

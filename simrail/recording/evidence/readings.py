@@ -165,9 +165,9 @@ def _parts(ride: Ride, x: FloatArray, by: Mapping[str, float], told: FloatArray)
     parts = np.empty((len(speed), _PARTS))
     parts[:, _TURN : _TURN + 3] = speed[:, None] * line[:, K1 : K3 + 1]
     beside = square * line[:, K3] + gravity * line[:, LEVEL]
-    parts[:, _LEAN_X] = _rate(beside, gravity * step)
+    parts[:, _LEAN_X] = np.gradient(beside, gravity * step)
     parts[:, _LEAN_Y] = beside / gravity * parts[:, _TURN + 2]
-    parts[:, _SQUAT_Y] = _rate(push, -gravity * step)
+    parts[:, _SQUAT_Y] = np.gradient(push, -gravity * step)
     parts[:, _PUSH], parts[:, _ALONG], parts[:, _BESIDE] = push, gravity * line[:, ALONG], beside
     parts[:, _UP] = gravity * line[:, UP] - square * line[:, K2]
     for name, which in zip(SLOW, (slice(0, _PUSH), slice(_PUSH, _PARTS)), strict=True):
@@ -178,14 +178,6 @@ def _parts(ride: Ride, x: FloatArray, by: Mapping[str, float], told: FloatArray)
             parts[:, which] -= _low_pass(parts[:, which], FINE / (by[name] * ride.block_s))
     means: FloatArray = parts.reshape(-1, FINE, _PARTS).mean(axis=1)
     return means
-
-
-def _rate(values: FloatArray, step: float) -> FloatArray:
-    """Rate of change (n,) of values at uniform times."""
-    rate = np.empty_like(values)
-    rate[1:-1] = (values[2:] - values[:-2]) / (2.0 * step)
-    rate[0], rate[-1] = (values[1] - values[0]) / step, (values[-1] - values[-2]) / step
-    return rate
 
 
 def _low_pass(values: FloatArray, samples: float) -> FloatArray:
