@@ -96,6 +96,7 @@ from simrail.estimators.odometry.pointing import (
     lag_of,
     place_sd_of,
     pointing_of,
+    section_of,
     sway_sd_of,
     turn_of,
 )
@@ -269,6 +270,7 @@ class CurveMatchedOdometry:
         grid, table = line_table(
             recording.track,
             chord=chord,
+            section=section_of(recording),
             mount_x_m=recording.mount_position_m[0],
             wheel_ahead_m=wheel_ahead(recording),
         )

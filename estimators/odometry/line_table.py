@@ -10,6 +10,12 @@ with s the middle of the chord, a half its length and b half a wheelbase: the ch
 of their own chords, y(s +- a) = [y(s +- a + b) + y(s +- a - b)]/2, for small angles between track and body.
 Where stiffness turns the body it is the sum of H over the axles, each with its weight.
 
+Its pitch is alike, of the heights. A body that joints hold in one plane with its neighbours has the pitch of
+that plane, which lies along the chord of their section, has its heading, and the mean roll of its ends: the
+upright of the plane leans by (pitch, -roll) there, and the body sees it turned by what it yaws in the plane,
+
+    pitch of the body = pitch cos(yaw) - roll sin(yaw),   yaw = heading of the body - heading of the section
+
 Where the map has a curve of curvature k, there lies one of (1 + bend) k; a joint of two elements that the map
 has at j lies at j + shift. To first order the curvature that lies there is
 
@@ -28,7 +34,7 @@ import numpy as np
 from simrail.core.jit import FloatArray, njit_borrowed
 from simrail.recording.sheets.vehicle_sheet import Chord
 from simrail.track.alignment import element_starts
-from simrail.track.design import Curve, Straight, TrackDesign
+from simrail.track.design import Curve, Straight, TrackDesign, TrackFrame
 
 PLACES_PER_M = 4.0
 
@@ -141,7 +147,12 @@ def line_over(grid: FloatArray, table: FloatArray, s: float, sd: float) -> Sprea
 
 
 def line_table(
-    track: TrackDesign, *, chord: Chord | None = None, mount_x_m: float = 0.0, wheel_ahead_m: float = 0.0
+    track: TrackDesign,
+    *,
+    chord: Chord | None = None,
+    section: Chord | None = None,
+    mount_x_m: float = 0.0,
+    wheel_ahead_m: float = 0.0,
 ) -> tuple[FloatArray, FloatArray]:
     """The map under a body on its chord, over the place of a mount on that body.
 
@@ -151,8 +162,10 @@ def line_table(
         The map.
     chord : Chord, optional
         What the body points along; without one it points where the track does.
+    section : Chord, optional
+        Of the bodies that joints hold in one plane with it; without one it pitches by itself.
     mount_x_m : float
-        Place of the mount along the body, in the chord's coordinates.
+        Place of the mount along the body, in the coordinates of both.
     wheel_ahead_m : float
         How far ahead of the mount the encoder's wheel is.
 
@@ -166,8 +179,8 @@ def line_table(
     count = math.ceil((track.end_m - track.start_m) * PLACES_PER_M) + 1
     places = np.minimum(track.start_m + np.arange(count) / PLACES_PER_M, track.end_m)
     frame = track.frame(places)
-    centre, held_at = (0.0, ()) if chord is None else (chord.centre_m - mount_x_m, chord.held_at)
-    reach = abs(centre) + max((abs(x) for x, _ in held_at), default=0.0) + abs(wheel_ahead_m) + 1.0
+    centre, held_at = _held(chord, mount_x_m)
+    reach = max(_reach(centre, held_at), _reach(*_held(section, mount_x_m))) + abs(wheel_ahead_m) + 1.0
     fine = np.arange(track.start_m - reach, track.end_m + reach, 1.0 / PLACES_PER_M)
     under = track.frame_extended(fine)
     curvature = under.rates[:, 2]
@@ -176,6 +189,8 @@ def line_table(
     heading, bend, even, odd, pitch = (
         _along_chord(fine, column, places + centre, held_at) for column in (*columns, under.pitch_rad)
     )
+    if section is not None:
+        pitch = _pitch_in_plane(fine, under, places - mount_x_m, heading, section)
     element = track.segment(np.clip(places + centre, track.start_m, track.end_m))
     curve = np.searchsorted(_curve_ends(track), places + centre, side="right")
     at_wheel = np.interp(places + wheel_ahead_m, fine, curvature)
@@ -184,6 +199,28 @@ def line_table(
     return np.array([track.start_m, PLACES_PER_M]), np.ascontiguousarray(
         np.column_stack(rows), dtype=np.float64
     )
+
+
+def _pitch_in_plane(
+    fine: FloatArray, under: TrackFrame, places: FloatArray, heading: FloatArray, section: Chord
+) -> FloatArray:
+    """Pitch of a body with its reference point over ``places`` and a heading, in the plane of its section."""
+    middle = places + section.centre_m
+    along = _along_chord(fine, under.yaw_rad, middle, section.held_at)
+    pitch = _along_chord(fine, under.pitch_rad, middle, section.held_at)
+    ends = [np.interp(middle + side * section.half_m, fine, under.roll_rad) for side in (1.0, -1.0)]
+    roll, yaw = 0.5 * (ends[0] + ends[1]), heading - along
+    return np.asarray(pitch * np.cos(yaw) - roll * np.sin(yaw))
+
+
+def _held(chord: Chord | None, mount_x_m: float) -> tuple[float, tuple[tuple[float, float], ...]]:
+    """How far the middle of a chord is ahead of a mount, and `Chord.held_at`."""
+    return (0.0, ()) if chord is None else (chord.centre_m - mount_x_m, chord.held_at)
+
+
+def _reach(centre: float, held_at: tuple[tuple[float, float], ...]) -> float:
+    """How far from a mount a chord is held."""
+    return abs(centre) + max((abs(x) for x, _ in held_at), default=0.0)
 
 
 def _along_chord(

@@ -12,6 +12,9 @@ from dataclasses import dataclass, replace
 PLACE_SD_M = 0.02
 """Standard deviation of a place along the vehicle where nobody has said it; synthetic."""
 
+NO_LEVER_M = 0.1
+"""What rests so near over the support of a body below, as a car body on a bolster, does not hang on it."""
+
 STIFFNESS_RELATIVE_SD = 0.2
 """Relative standard deviation of stiffness, damping and inertia where nobody has said it; synthetic."""
 
@@ -209,6 +212,54 @@ class VehicleSheet:
             return None
         chord = self._by_supports(here)
         return self._turned(here, chord) if here.turned_by and chord is not None else chord
+
+    def section(self, body: str) -> Chord | None:
+        """The chord of the section that a body is held in, in its own coordinates.
+
+        Bodies that hang on each other and have two places to rest on in all lie in one plane: were their
+        joints to turn otherwise than in yaw, the section would fold. None for a body by itself, and where
+        more bear it.
+        """
+        here, names = self.body(body), self._hung_together(body)
+        bearers = {
+            (other.x_m + support.x_m, support.on)
+            for other in self.bodies
+            if other.name in names
+            for support in other.supports
+            if support.on not in names
+        }
+        if here is None or len(names) == 1 or len(bearers) != 2:
+            return None
+        (rear, lower), (front, upper) = sorted(bearers)
+        return Chord(
+            centre_m=0.5 * (rear + front) - here.x_m,
+            half_m=0.5 * (front - rear),
+            half_wheelbase_m=0.5 * (self._half_wheelbase_m(lower) + self._half_wheelbase_m(upper)),
+            sd_m=self.place_sd_m,
+        )
+
+    def _hung_together(self, name: str) -> set[str]:
+        """The bodies that joints connect with one, and itself."""
+        joints = [
+            {body.name, support.on}
+            for body in self.bodies
+            for support in body.supports
+            if self._is_joint(body.x_m + support.x_m, support.on)
+        ]
+        names = {name}
+        for _ in joints:
+            names = names.union(*(joint for joint in joints if joint & names))
+        return names
+
+    def _is_joint(self, x_m: float, below: str) -> bool:
+        """Whether what rests on a body here hangs on it: one that bogies bear, elsewhere than over them."""
+        lower = self.body(below)
+        if lower is None:
+            return False
+        on = [self.body(support.on) for support in lower.supports]
+        is_carried = any(body is not None and body.supports for body in on)
+        over = (lower.x_m + support.x_m for support in lower.supports)
+        return is_carried and not any(math.isclose(x_m, x, abs_tol=NO_LEVER_M) for x in over)
 
     def _turned(self, here: SheetBody, chord: Chord) -> Chord:
         """A chord where the stiffness between a body and its axles turns it."""

@@ -4,10 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 from simrail.estimators.odometry.line_table import Line, line_at, line_table
 
 from simrail.recording.sheets.vehicle_sheet import Chord
 from simrail.track.design import Curve, Straight, TrackDesign, Transition
+from simrail.track.elements import Gradient
 from simrail.track.file import track_by_name
 from simrail.track.map_errors import EXACT, draw_map
 
@@ -120,3 +122,36 @@ def test_shipped_lines_have_a_table():
         _, table = line_table(track, chord=Chord(0.0, 5.0, 1.0, 0.0), mount_x_m=2.0)
         assert np.isfinite(table).all()
         assert (np.diff(table[:, 8]) >= 0.0).all()
+
+
+def test_a_jointed_body_pitches_with_the_plane_of_its_section() -> None:
+    """On a canted arc on a slope and on a transition: its axis lies in the plane of the section's axes.
+
+    By rotations in full; what is left is a product of three angles (roll .05, slope .02, yaw .03).
+    Pitched by itself on the arc it would be .05 times a yaw of 6.64 m over 250 m off.
+    """
+    section, own = Chord(-6.64, 5.8, 0.9, 0.0), Chord(-0.84, 0.9, 0.0, 0.0)
+    hill = replace(LINE, gradients=(Gradient(0.0, 0.02),))
+    assert float(hill.frame(np.array([200.0])).pitch_rad[0]) == pytest.approx(-0.02, abs=1e-4)
+    for s in (130.0, 200.0, 215.0):
+        grid, table = line_table(hill, chord=own, section=section, mount_x_m=1.5)
+        body = line_at(grid, table, s)
+        middle = s - 1.5 - 6.64
+        ends = hill.frame(np.array([middle - 5.8, middle + 5.8]))
+        along = Rotation.from_euler(
+            "ZYX",
+            [
+                float(hill.frame(np.array([middle])).yaw_rad[0]) + RAMP * 5.8**2 / 6.0 * (s == 130.0),
+                float(ends.pitch_rad.mean()),
+                float(ends.roll_rad.mean()),
+            ],
+        )
+        upright = along.apply([0.0, 0.0, 1.0])
+        steep = upright[0] * np.cos(body.heading) + upright[1] * np.sin(body.heading)
+        assert body.pitch == pytest.approx(float(np.arctan2(steep, upright[2])), abs=3e-5)
+        alone = line_at(grid, line_table(hill, chord=own, mount_x_m=1.5)[1], s)
+        assert abs(body.pitch - alone.pitch) > (1e-3 if s > 140.0 else 1e-4)
+        same = alone._replace(pitch=body.pitch, pitch_slope=body.pitch_slope)
+        assert tuple(same) == pytest.approx(
+            tuple(body), abs=0.004 * 0.25**2 / 8.0
+        )  # another grid under the chord

@@ -21,6 +21,7 @@ CAR = VehicleSheet(
         SheetBody("body", 0.5, (Support("front", 8.5), Support("rear", -7.5))),
     )
 )
+BOGIES = (("front", 9.0), ("rear", -7.0))
 ARTICULATED = VehicleSheet(
     (
         *bogie("one", 6.0, 0.9),
@@ -110,6 +111,25 @@ def test_a_body_on_one_bogie_points_along_it() -> None:
 def test_a_body_between_two_points_from_joint_to_joint() -> None:
     chord = ARTICULATED.chord("middle")
     assert (chord.centre_m, chord.half_m, chord.half_wheelbase_m) == (-0.25, 3.0, 0.0)
+
+
+def test_hung_bodies_on_two_bogies_are_a_section() -> None:
+    """From bogie to bogie, seen from each body; of a bogie, an axle and a car by itself there is none."""
+    for name, x in (("head", 7.0), ("middle", 0.25), ("tail", -6.0)):
+        assert same(ARTICULATED.section(name), 0.5 - x, 5.5, 0.8, 0.02, 0.0), name
+    assert [ARTICULATED.section(name) for name in ("one", "one.f", "nobody")] == [None] * 3
+    assert [CAR.section(name) for name in ("body", "front")] == [None] * 2
+
+
+def test_hung_bodies_on_more_bogies_may_fold() -> None:
+    """And what lies on a bolster right over its bogie does not hang on it."""
+    hung = SheetBody("more", -11.0, (Support("tail", 2.0), Support("three", -1.0)))
+    longer = VehicleSheet((*bogie("three", -12.0, 0.7), *ARTICULATED.bodies, hung))
+    assert [longer.section(name) for name in ("head", "tail", "more")] == [None] * 3
+    bolsters = tuple(SheetBody(f"{name} bolster", x, (Support(name, 0.0),)) for name, x in BOGIES)
+    body = SheetBody("body", 0.5, (Support("front bolster", 8.5), Support("rear bolster", -7.5)))
+    sheet = VehicleSheet((*CAR.bodies[:6], *bolsters, body))
+    assert [sheet.section(name) for name in ("body", "front bolster")] == [None] * 2
 
 
 def test_stiffness_turns_a_body_where_the_drawing_says_it() -> None:
