@@ -11,12 +11,24 @@ import pytest
 
 from simrail.campaign.cell import CellResult
 from simrail.report.figures import canvas
+from simrail.report.pages.page import sections_of
+from simrail.report.pages.section import PageData
 from simrail.report.tables.geometry import behind_baseline, is_zero
 from simrail.report.tables.methods import MethodStyle, method_styles
 from simrail.report.tables.pivot import Case, Mean, _index, cases, of_cell
 from simrail.report.tables.provenance import _irregularities, facts
 from simrail.report.tables.running import running_table
-from simrail.report.tables.tables import NONE, Cell, Row, Table, error_table, number_cell, without_empty
+from simrail.report.tables.tables import (
+    NONE,
+    Cell,
+    Row,
+    Table,
+    error_table,
+    number_cell,
+    odometry_table,
+    without_empty,
+)
+from simrail.report.words.verdicts import imu_words
 from simrail.scenario.line_tables import IrregularityPart
 from simrail.scenario.scenario import Scenario, load_scenario
 from simrail.scoring.ride_figures import RIDE
@@ -216,3 +228,19 @@ def test_behind_the_baseline_is_what_errs_more_than_no_imu() -> None:
     told = behind_baseline(case, styles, "cross_level", band="full")
     assert [style.name for style in told] == ["better"]
     assert behind_baseline(case, styles[1:], "cross_level", band="D1") == []
+
+
+def test_a_sheet_of_ones_own_is_told_by_its_file(scenario: Scenario, example: Rides, tables: Tables) -> None:
+    """Unless two have one name."""
+    scores, cells = tables(example(), draws=2)
+    own = "/somewhere/far/away/my_imu.toml"
+    data = PageData(scenario, scores.assign(imu=own), cells.assign(imu=own), [], {})
+    (case,) = data.shown_cases
+    assert imu_words(case.labels).endswith(" (my_imu.toml)")
+    assert all(" (my_imu.toml) " in row.label for row in odometry_table([case]).rows)
+    assert data.question is not None and set(data.question.judged["slot"]) == {"my_imu.toml"}
+    text = "".join(str(section.data) for section in sections_of(data) if section.anchor != "parts")
+    assert "my_imu.toml" in text and "far" not in text.replace("farth", "")
+    imu = [f"/{'ab'[draw]}/my_imu.toml" for draw in scores["sensor_draw"]]
+    two = PageData(scenario, scores.assign(imu=imu), cells, [], {}).question
+    assert two is not None and set(two.judged["slot"]) == {"/a/my_imu.toml", "/b/my_imu.toml"}
