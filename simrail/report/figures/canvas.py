@@ -315,9 +315,10 @@ def slots_panel(tall_in: float, words: Sequence[str], *, top_in: float = 0.42) -
     lines = [parted(word) for word in words]
     longest = max((len(word) for word in words), default=0)
     rows = max((line.count("\n") for line in lines), default=0)
-    bottom = 0.15 + 0.07 * longest if upright else 0.32 + 0.14 * rows
+    size = 8.0 if len(words) < 9 else 7.0
+    bottom = 0.2 + 0.6 / 72.0 * size * longest if upright else 0.32 + 0.14 * rows
     figure, axes = panels([tall_in], top_in=top_in, bottom_in=bottom)
-    categories(axes[0], words if upright else lines, size=8.0 if len(words) < 9 else 7.0)
+    categories(axes[0], words if upright else lines, size=size)
     if upright:
         axes[0].tick_params(axis="x", labelrotation=90.0)
     return figure, axes
