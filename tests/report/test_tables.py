@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import combinations
 
 import numpy as np
 import pandas as pd
 import pytest
+from matplotlib.colors import to_rgb
 
 from simrail.campaign.cell import CellResult
 from simrail.report.figures import canvas
@@ -78,8 +80,10 @@ def test_cases_are_found_by_their_labels(example: Rides, tables: Tables) -> None
     assert all_cases[0].curves() == ["curve:curve 3 R300"]
 
 
-def test_many_methods_of_one_class_have_shades_of_their_own() -> None:
-    styles = method_styles(load_scenario("metro_geometry"))
+@pytest.mark.parametrize("name", ["metro_geometry", "scale_track"])
+def test_many_methods_of_one_class_have_colours_of_their_own(name: str) -> None:
+    """Ten shades of green were not told apart."""
+    styles = method_styles(load_scenario(name))
     smoothers = [style.colour for name, style in styles.items() if name.startswith(("smoother", "filter"))]
     assert len(smoothers) > 3
     assert len(set(smoothers)) == len(smoothers)
@@ -87,6 +91,8 @@ def test_many_methods_of_one_class_have_shades_of_their_own() -> None:
     nights = [canvas.by_night(colour) for colour in smoothers]
     assert min(canvas.contrast(colour, canvas.NIGHT) for colour in nights) > 3.0
     assert len(set(nights)) == len(nights)
+    for one, two in combinations(smoothers, 2):
+        assert max(abs(a - b) for a, b in zip(to_rgb(one), to_rgb(two), strict=True)) > 0.2
     few = method_styles(load_scenario("validation_quick"))
     assert few["ekf_compensated"].colour == "#0072B2"
 
