@@ -108,7 +108,7 @@ def test_strokes_of_one_look_are_one_path_unless_they_are_seen_through():
 
 
 def test_a_figure_over_distance_is_small_and_whole():
-    """Three panels of four lines of 1,400 points: 240 kB as matplotlib writes them."""
+    """Three panels of four lines of 1,400 points."""
     random = np.random.default_rng(3)
     x = np.linspace(0.0, 2000.0, 1400)
     with canvas.look():
