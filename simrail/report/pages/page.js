@@ -19,7 +19,7 @@
   const numbers = held => {
     if (!decoded.has(held)) {
       const [low, step, text] = held, steps = new Uint16Array(Uint8Array.from(atob(text), c => c.charCodeAt(0)).buffer);
-      decoded.set(held, Float64Array.from(steps, count => count === 65535 ? NaN : low + step * count));
+      decoded.set(held, Float64Array.from(steps, count => count < 65535 ? low + step * count : NaN));
     }
     return decoded.get(held);
   };
