@@ -112,9 +112,8 @@ def print_scores(console: Console, results: Results) -> None:
 def print_cell(console: Console, campaign: CampaignResult) -> None:
     """Print every score of one cell."""
     first = campaign.cells.iloc[0]
-    console.print(
-        f"[bold]cell {first['cell']}[/bold]: ride {first['ride']}, {first['imu']} on {first['mount']}"
-    )
+    where = f"ride {first['ride']}, {short_name(first['imu'])} on {first['mount']}"
+    console.print(f"[bold]cell {first['cell']}[/bold]: {where}")
     columns = ["estimator", "quantity", "band", "reference", "window", "metric", "value", "unit", "status"]
     print(campaign.scores[columns].to_string(index=False, float_format=lambda value: f"{value:.9g}"))
     print_warnings(console, campaign)

@@ -54,7 +54,8 @@ def print_budgets(console: Console, budgets: pd.DataFrame) -> None:
     for _, own in budgets.groupby(["number", "vehicle", "mount", "imu"], sort=False):
         first = own.iloc[0]
         console.print()
-        console.print(Text(f"{budget_sentence(own)}, {first['imu']} on the {first['mount']}", style="bold"))
+        words = f"{budget_sentence(own)}, {short_name(first['imu'])} on the {first['mount']}"
+        console.print(Text(words, style="bold"))
         table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
         for title in ("what", "share of the square", "95 %"):
             table.add_column(title, justify="left" if title == "what" else "right")

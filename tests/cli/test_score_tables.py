@@ -11,8 +11,8 @@ import pandas as pd
 import pytest
 from rich.console import Console
 
-from simrail.cli.score_tables import MOST_NAMES, MOST_TABLES, WIDEST, print_scores
-from simrail.cli.verdict_tables import _none_enough
+from simrail.cli.score_tables import MOST_NAMES, MOST_TABLES, WIDEST, print_cell, print_scores
+from simrail.cli.verdict_tables import _none_enough, print_budgets
 from simrail.scenario.scenario import Scenario, read_scenario
 from simrail.scoring.table import NO_SAMPLES, OK, QUANTITY_UNITS, SCORE_COLUMNS, TOO_SHORT, UNOBSERVABLE
 
@@ -285,6 +285,20 @@ def test_a_sheet_of_ones_own_is_told_by_its_file(scenario: Scenario) -> None:
     own = "/somewhere/far/away/my_imu.toml"
     lines = shown(scenario, table.assign(imu=own), cells.assign(imu=own), width=200)
     assert lines[0].startswith("ride0: 10 km/h backward, my_imu.toml on body,")
+
+
+def test_so_is_the_one_of_a_single_cell_and_of_a_budget(capsys: pytest.CaptureFixture[str]) -> None:
+    table, cells = many(1)
+    own = "/somewhere/far/away/my_imu.toml"
+    console = Console(width=200)
+    print_cell(console, SimpleNamespace(cells=cells.assign(imu=own), scores=table, warnings=()))  # type: ignore[arg-type]
+    first = capsys.readouterr().out.splitlines()[0]
+    assert first == "cell 0: ride ride0, my_imu.toml on body"
+    of = {"number": 0, "vehicle": "car", "mount": "axle", "imu": own, "what": "roll, rms", "unit": "deg"}
+    budget = {"words": "gyro bias", "share": 0.9, "low95": 0.8, "high95": 1.0, "rms_of_whole": 0.1}
+    print_budgets(console, pd.DataFrame([of | budget]))
+    told = capsys.readouterr().out
+    assert "is gyro bias, my_imu.toml on the axle" in told and "far" not in told
 
 
 def test_what_no_device_has_shown_is_open_and_no_verdict() -> None:

@@ -6,20 +6,23 @@ import re
 import time
 from collections.abc import Mapping
 from dataclasses import replace
-from itertools import product
+from itertools import combinations, product
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from simrail.campaign.cell import CellResult
+from simrail.report.campaign import heat
 from simrail.report.campaign.axes import campaign_axes, draws_of, finest, is_campaign
 from simrail.report.campaign.figures import box_figure, curvature_figure, in_two
-from simrail.report.campaign.heat import heat_maps, rails_figures, short_number, side_of
+from simrail.report.campaign.heat import Side, heat_maps, rails_figures, short_number, side_of
 from simrail.report.campaign.tables import TABLES, campaign_tables, write_tables
-from simrail.report.figures.canvas import drawn
+from simrail.report.figures import canvas
+from simrail.report.figures.canvas import NARROW_IN, WIDE_IN, drawn
 from simrail.report.pages.page import write_report
 from simrail.report.tables.methods import MethodStyle, method_styles
 from simrail.scenario.scenario import Scenario, load_scenario, read_scenario
@@ -278,6 +281,41 @@ def test_heat_maps_show_the_means(small: Scores, styles: list[MethodStyle]) -> N
                 at = (rows["imu"] == grade) & (rows["speed_kmh"] == speed) & (rows["direction"] == way)
                 assert f">{rows.loc[at, 'value'].mean():.2f}</text>" in svg
     assert "20 \u2192" in svg and "70 \u2190" in svg
+
+
+@pytest.mark.parametrize("width", [WIDE_IN, NARROW_IN])
+@pytest.mark.parametrize("rows", [1, 9])
+def test_words_and_numbers_of_a_map_do_not_run_together(
+    width: float, rows: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """On a phone they did: numbers of neighbours, words below, and the decades of a low bar of colours."""
+    figures: list[Any] = []
+    monkeypatch.setattr(heat, "to_svg", lambda figure, **more: figures.append(figure) or "")
+    monkeypatch.setattr(canvas, "width_in", lambda: width)
+    monkeypatch.setattr(heat, "width_in", lambda: width)
+    across = Side("mount", [(c,) for c in "abcde"], [f"axle_noise_{c}" for c in "abcde"], ["mount"])
+    down = Side("method", [(r,) for r in range(rows)], [f"smoother cml {r}" for r in range(rows)], ["method"])
+    sizes = 10.0 ** np.linspace(-2.7, 0.4, 5)
+    draws = pd.DataFrame(
+        [
+            {"method": r, "mount": c, "value": size}
+            for r in range(rows)
+            for c, size in zip("abcde", sizes, strict=True)
+        ]
+    )
+    heat_maps({"roll": draws, "pitch": draws}, across, down, unit="mm", what="heat")
+    (figure,) = figures
+    pen = FigureCanvasAgg(figure).get_renderer()
+    figure.draw(pen)
+    whole = figure.bbox
+    for axis in figure.axes:
+        numbers = [text for text in axis.texts if text.get_text()]
+        below = [text for text in axis.get_xticklabels() if text.get_text()]
+        beside = [text for text in axis.get_yticklabels() if text.get_text()]
+        for words in (numbers, below, beside):
+            boxes = [text.get_window_extent(pen) for text in words]
+            assert not any(one.overlaps(two) for one, two in combinations(boxes, 2)), words
+            assert all(whole.x0 <= box.x0 and whole.y0 <= box.y0 and box.x1 <= whole.x1 for box in boxes)
 
 
 @pytest.mark.long

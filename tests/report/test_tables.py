@@ -4,19 +4,33 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import combinations
 
 import numpy as np
 import pandas as pd
 import pytest
+from matplotlib.colors import to_rgb
 
 from simrail.campaign.cell import CellResult
 from simrail.report.figures import canvas
+from simrail.report.pages.page import sections_of
+from simrail.report.pages.section import PageData
 from simrail.report.tables.geometry import behind_baseline, is_zero
 from simrail.report.tables.methods import MethodStyle, method_styles
 from simrail.report.tables.pivot import Case, Mean, _index, cases, of_cell
 from simrail.report.tables.provenance import _irregularities, facts
 from simrail.report.tables.running import running_table
-from simrail.report.tables.tables import NONE, Cell, Row, Table, error_table, number_cell, without_empty
+from simrail.report.tables.tables import (
+    NONE,
+    Cell,
+    Row,
+    Table,
+    error_table,
+    number_cell,
+    odometry_table,
+    without_empty,
+)
+from simrail.report.words.verdicts import imu_words
 from simrail.scenario.line_tables import IrregularityPart
 from simrail.scenario.scenario import Scenario, load_scenario
 from simrail.scoring.ride_figures import RIDE
@@ -66,8 +80,10 @@ def test_cases_are_found_by_their_labels(example: Rides, tables: Tables) -> None
     assert all_cases[0].curves() == ["curve:curve 3 R300"]
 
 
-def test_many_methods_of_one_class_have_shades_of_their_own() -> None:
-    styles = method_styles(load_scenario("metro_geometry"))
+@pytest.mark.parametrize("name", ["metro_geometry", "scale_track"])
+def test_many_methods_of_one_class_have_colours_of_their_own(name: str) -> None:
+    """Ten shades of green were not told apart."""
+    styles = method_styles(load_scenario(name))
     smoothers = [style.colour for name, style in styles.items() if name.startswith(("smoother", "filter"))]
     assert len(smoothers) > 3
     assert len(set(smoothers)) == len(smoothers)
@@ -75,6 +91,8 @@ def test_many_methods_of_one_class_have_shades_of_their_own() -> None:
     nights = [canvas.by_night(colour) for colour in smoothers]
     assert min(canvas.contrast(colour, canvas.NIGHT) for colour in nights) > 3.0
     assert len(set(nights)) == len(nights)
+    for one, two in combinations(smoothers, 2):
+        assert max(abs(a - b) for a, b in zip(to_rgb(one), to_rgb(two), strict=True)) > 0.2
     few = method_styles(load_scenario("validation_quick"))
     assert few["ekf_compensated"].colour == "#0072B2"
 
@@ -216,3 +234,19 @@ def test_behind_the_baseline_is_what_errs_more_than_no_imu() -> None:
     told = behind_baseline(case, styles, "cross_level", band="full")
     assert [style.name for style in told] == ["better"]
     assert behind_baseline(case, styles[1:], "cross_level", band="D1") == []
+
+
+def test_a_sheet_of_ones_own_is_told_by_its_file(scenario: Scenario, example: Rides, tables: Tables) -> None:
+    """Unless two have one name."""
+    scores, cells = tables(example(), draws=2)
+    own = "/somewhere/far/away/my_imu.toml"
+    data = PageData(scenario, scores.assign(imu=own), cells.assign(imu=own), [], {})
+    (case,) = data.shown_cases
+    assert imu_words(case.labels).endswith(" (my_imu.toml)")
+    assert all(" (my_imu.toml) " in row.label for row in odometry_table([case]).rows)
+    assert data.question is not None and set(data.question.judged["slot"]) == {"my_imu.toml"}
+    text = "".join(str(section.data) for section in sections_of(data) if section.anchor != "parts")
+    assert "my_imu.toml" in text and "far" not in text.replace("farth", "")
+    imu = [f"/{'ab'[draw]}/my_imu.toml" for draw in scores["sensor_draw"]]
+    two = PageData(scenario, scores.assign(imu=imu), cells, [], {}).question
+    assert two is not None and set(two.judged["slot"]) == {"/a/my_imu.toml", "/b/my_imu.toml"}

@@ -86,6 +86,8 @@ def _draw_boxes(panel: Axes, draws: pd.DataFrame, styles: Sequence[MethodStyle],
 
 
 def _slot_words(axis: CampaignAxis) -> list[str]:
+    if canvas.is_narrow():
+        return [canvas.parted(word) for word in axis.words]
     longest = LONG_WORD if len(axis.words) <= MOST_IN_ONE_LINE else LONG_WORD // 2
     return [in_two(word, longest=longest) for word in axis.words]
 

@@ -1,5 +1,6 @@
 """Heat maps over the axes of a campaign; of rails, what methods err by in the band that counts."""
 
+import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -19,6 +20,7 @@ from simrail.report.figures.canvas import (
     Drawing,
     add_panel,
     drawn,
+    is_narrow,
     look,
     panels_beside,
     to_svg,
@@ -41,6 +43,15 @@ CELL_IN = (0.46, 0.27)
 
 LETTER_IN = 0.075
 """Width of a letter of nine points."""
+
+NUMBER_IN = 0.16
+"""Height of a number beside the bar of colours, with what parts it from the next."""
+
+LEAST_FREE = 0.8
+"""Share of their room to which words beside each other are made small: 7.2 points."""
+
+MOST_DIGITS = 5
+"""Letters of the longest `short_number` of usual sizes: 0.013."""
 
 
 @dataclass(frozen=True)
@@ -102,8 +113,11 @@ def heat_maps(
         return ""
     low, high = float(positive.min()), float(positive.max())
     norm = LogNorm(low, max(high, 1.05 * low))
-    left, right, gap, title_in = 0.35 + LETTER_IN * max(len(word) for word in down.words), 0.85, 0.22, 0.34
-    wide = max(CELL_IN[0], LETTER_IN * max(len(word) for word in across.words)) * len(across.words)
+    longest = max(len(word) for word in across.words)
+    # On a phone there is no room for a bar: the cells have numbers.
+    left, right = 0.35 + LETTER_IN * max(len(word) for word in down.words), 0.15 if is_narrow() else 0.85
+    gap, title_in = 0.22, 0.34
+    wide = max(CELL_IN[0], LETTER_IN * longest) * len(across.words)
     tall = CELL_IN[1] * len(down.words)
     room = width_in() - left - right
     per_row = max(1, min(len(tables), int((room + gap) / (wide + gap))))
@@ -111,8 +125,10 @@ def heat_maps(
     per_row = -(-len(tables) // rows)
     wide = min((room - gap * (per_row - 1)) / per_row, 1.8 * wide)
     end = left + per_row * (wide + gap)
-    # Words of neighbours must not touch where a phone leaves less than they need.
-    free = wide / len(across.words) / (LETTER_IN * (1 + max(len(word) for word in across.words)))
+    # Words of neighbours must not touch: they are small, or upright, where there is less than they need.
+    cell_in = wide / len(across.words)
+    free = min(cell_in / (LETTER_IN * (1 + longest)), 1.0)
+    upright = free < LEAST_FREE
     with look():
         figure, axes = panels_beside(
             len(tables),
@@ -123,20 +139,25 @@ def heat_maps(
             top_in=title_in,
             gap_in=gap,
             row_gap_in=title_in,
+            bottom_in=0.35 + LETTER_IN * longest if upright else 0.5,
         )
         for number, (axis, (title, table)) in enumerate(zip(axes, tables, strict=True)):
-            _draw_heat(axis, table, norm)
+            _draw_heat(axis, table, norm, size=min(8.0, 72.0 * cell_in / (0.6 * MOST_DIGITS)))
             axis.set_title(title, color=MUTED if title in muted else INK, pad=4.0)
             is_first, is_last = number % per_row == 0, number + per_row >= len(tables)
             axis.set_yticks(range(len(down.words)), down.words if is_first else [])
-            axis.set_xticks(
-                range(len(across.words)), across.words if is_last else [], fontsize=9.0 * min(free, 1.0)
-            )
+            size = 9.0 * (1.0 if upright else free)
+            axis.set_xticks(range(len(across.words)), across.words if is_last else [], fontsize=size)
+            if upright:
+                axis.tick_params(axis="x", labelrotation=90.0)
             if is_last:
                 axis.set_xlabel(across.title)
             if is_first:
                 axis.set_ylabel(down.title.partition(",")[0])
-        _colour_bar(figure, norm, unit, end, title_in, min(tall, 1.6))
+        if is_narrow():
+            figure.text(1.0, 1.0, unit, fontsize=8.5, ha="right", va="top")
+        else:
+            _colour_bar(figure, norm, unit, end, title_in, min(rows * (tall + title_in) - title_in, 1.6))
         return to_svg(figure, description=what)
 
 
@@ -202,7 +223,7 @@ def _means(draws: pd.DataFrame, across: Side, down: Side) -> FloatArray:
     return np.array(table, dtype=np.float64)
 
 
-def _draw_heat(axis: Axes, table: FloatArray, norm: LogNorm) -> None:
+def _draw_heat(axis: Axes, table: FloatArray, norm: LogNorm, *, size: float) -> None:
     rows, columns = table.shape
     edges = np.arange(columns + 1) - 0.5, np.arange(rows + 1) - 0.5
     shown = np.ma.masked_invalid(table)
@@ -217,7 +238,7 @@ def _draw_heat(axis: Axes, table: FloatArray, norm: LogNorm) -> None:
             is_dark = float(norm(max(value, norm.vmin or value))) > 0.5
             # Colours of the cell, not of the page: they are the same in dark mode.
             text, colour = short_number(value), "#fefefe" if is_dark else "#1b2431"
-        axis.text(j, i, text, ha="center", va="center", fontsize=8.0, color=colour)
+        axis.text(j, i, text, ha="center", va="center", fontsize=size, color=colour)
 
 
 def short_number(value: float) -> str:
@@ -231,10 +252,13 @@ def _colour_bar(figure: Figure, norm: LogNorm, unit: str, left: float, top: floa
     axis = add_panel(figure, left, height - top - tall, 0.11, tall)
     bar = figure.colorbar(ScalarMappable(norm, HEAT), cax=axis)
     bar.outline.set_visible(False)
-    # Its ends are told, and what decades lie well between them.
+    # Its ends are told, and what decades lie well between them: clear of each other by a number's height.
     low, high = float(norm.vmin or 1.0), float(norm.vmax or 1.0)
     decades = 10.0 ** np.arange(np.ceil(np.log10(low)), np.floor(np.log10(high)) + 1.0)
-    marks = [low, *(mark for mark in decades if 1.8 * low < mark < high / 1.8), high]
+    apart = max(1.8, (high / low) ** (NUMBER_IN / tall))
+    marks = [low]
+    marks += [mark for mark in decades[:: math.ceil(math.log10(apart))] if apart * low < mark < high / apart]
+    marks.append(high)
     bar.set_ticks(marks, labels=[short_number(mark) for mark in marks])
     axis.grid(visible=False)
     axis.minorticks_off()

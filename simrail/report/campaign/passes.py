@@ -12,6 +12,7 @@ from simrail.report.tables.methods import MethodStyle
 from simrail.report.tables.pivot import Case
 from simrail.report.tables.tables import NONE, Cell, Row, Table
 from simrail.report.words.ablations import state_words
+from simrail.report.words.verdicts import imu_words
 from simrail.scoring.table import FULL
 
 PASSES = "passes"
@@ -30,7 +31,7 @@ def passes_section(data: PageData) -> list[Section]:
     for group in groups_of(data.cases):
         for style in mappers(group[0], data.styles):
             labels = group[0].labels
-            title = f"{style.label}: IMU {labels['mount']} ({labels['imu']}), {state_words(labels)}"
+            title = f"{style.label}: IMU {imu_words(labels)}, {state_words(labels)}"
             name = f"passes-{len(shown) + 1}"
             drawing = canvas.drawn(name, partial(passes_figure, group, style, what=title))
             shown.append((title, drawing, passes_table(group, style)))

@@ -145,7 +145,7 @@ def overview(table: pd.DataFrame, styles: Sequence[MethodStyle]) -> dict[str, An
         "sentence": glance_sentence(table, styles),
         "heads": heads,
         "mounts": [" ".join(word for word in (mount, vehicle) if word) for _, mount, vehicle in columns],
-        "rows": [(imu, [cells.get((imu, i)) for i in range(len(columns))]) for imu in imus],
+        "rows": [(short_name(imu), [cells.get((imu, i)) for i in range(len(columns))]) for imu in imus],
     }
 
 
@@ -159,8 +159,8 @@ def _budgets(
         (budgets["number"] == number) & (budgets["vehicle"] == vehicle) & (budgets["mount"] == mount)
     ]
     for imu, budget in own.groupby("imu", sort=False):
-        sentence = f"{imu}: {budget_sentence(budget)}."
-        name = f"budget-{number + 1}-{vehicle}-{mount}-{imu}"
+        sentence = f"{short_name(imu)}: {budget_sentence(budget)}."
+        name = f"budget-{number + 1}-{vehicle}-{mount}-{short_name(imu)}"
         yield sentence, canvas.drawn(name, partial(budget_chart, budget, sentence))
 
 
@@ -221,8 +221,10 @@ def _case_columns(rows: pd.DataFrame) -> list[str]:
 
 
 def _word(key: str, value: object) -> str:
+    if key == "imu":
+        return short_name(value)
     number = f"{value:g}" if isinstance(value, float) else str(value)
-    return number if key in ("imu", "ride", "direction") else f"{key} {number}"
+    return number if key in ("ride", "direction") else f"{key} {number}"
 
 
 def _cell(row: pd.Series) -> dict[str, Any]:
@@ -259,7 +261,7 @@ def decision_chart(
     imus = list(dict.fromkeys(rows["imu"].astype(str)))
     best = best_method(rows, styles)
     with canvas.look():
-        figure, (panel,) = canvas.slots_panel(2.7, imus, top_in=0.75)
+        figure, (panel,) = canvas.slots_panel(2.7, [short_name(imu) for imu in imus], top_in=0.75)
         for slot, style in enumerate(methods):
             for i, imu in enumerate(imus):
                 own = finite[(finite["imu"] == imu) & (finite["estimator"] == style.name)]["value"]

@@ -32,6 +32,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormat
 from simrail.core.atomic_files import write_whole
 from simrail.core.jit import FloatArray
 from simrail.report.figures.decimate import Bins
+from simrail.report.figures.shorter import shorter
 from simrail.report.tables.methods import MethodStyle, mixed
 from simrail.report.tables.pivot import Mean
 from simrail.track.design import CURVE, TRANSITION, Curve, TrackDesign
@@ -158,6 +159,9 @@ _RC: dict[Any, Any] = {
     "ytick.labelcolor": INK,
     "xtick.major.size": 3.0,
     "ytick.major.size": 3.0,
+    # A line of the grid shows where they are.
+    "xtick.minor.size": 0.0,
+    "ytick.minor.size": 0.0,
     "lines.linewidth": 1.1,
     "lines.solid_joinstyle": "round",
     "path.simplify_threshold": 0.75,
@@ -311,9 +315,10 @@ def slots_panel(tall_in: float, words: Sequence[str], *, top_in: float = 0.42) -
     lines = [parted(word) for word in words]
     longest = max((len(word) for word in words), default=0)
     rows = max((line.count("\n") for line in lines), default=0)
-    bottom = 0.15 + 0.07 * longest if upright else 0.32 + 0.14 * rows
+    size = 8.0 if len(words) < 9 else 7.0
+    bottom = 0.2 + 0.6 / 72.0 * size * longest if upright else 0.32 + 0.14 * rows
     figure, axes = panels([tall_in], top_in=top_in, bottom_in=bottom)
-    categories(axes[0], words if upright else lines, size=8.0 if len(words) < 9 else 7.0)
+    categories(axes[0], words if upright else lines, size=size)
     if upright:
         axes[0].tick_params(axis="x", labelrotation=90.0)
     return figure, axes
@@ -639,7 +644,7 @@ def to_svg(figure: Figure, *, description: str) -> Markup:
     link = 'xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink"'
     head = f'<svg {view.group()} {link} role="img" aria-label="{escape(description, quote=True)}">'
     text = re.sub(r"\s*\n\s*", "\n", head + text[text.index(">") + 1 :])
-    return Markup(re.sub(r"\n([MLz\"])", r"\1", text).strip())  # a path in one line
+    return Markup(shorter(re.sub(r"\n([MLz\"])", r"\1", text).strip()))
 
 
 def _of_both(style: re.Match[str]) -> str:

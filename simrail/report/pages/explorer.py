@@ -2,7 +2,7 @@
 
 The explorer is some 390 lines of our own on canvases (``page.js``, 20 kB). With 6 panels of 5 series of
 4000 points, offline, in headless Chromium on a shared machine (``results/reference/pages.py``), its page has
-0.7 MB and 69 elements and is painted in 1.5 to 2.0 s. With plotly, the only such library with a bundle on
+0.4 MB and 69 elements and is painted in 0.8 to 2.0 s. With plotly, the only such library with a bundle on
 PyPI, it has 6.2 MB and 1027 elements and takes 4.6 to 10 s. uPlot is as light as ours, but its home is npm,
 so that a wheel would have to carry a copy of it. Ours saves what is seen as SVG, and follows dark mode.
 """

@@ -15,11 +15,13 @@
 
   // ---- numbers ---------------------------------------------------------------------------------------------
   const decoded = new Map();
-  const numbers = text => {
-    if (!decoded.has(text)) {
-      decoded.set(text, new Float32Array(Uint8Array.from(atob(text), c => c.charCodeAt(0)).buffer));
+  // The least of them, a step, and how many steps of it each is above the least, in 16 bits; 65535 is nothing.
+  const numbers = held => {
+    if (!decoded.has(held)) {
+      const [low, step, text] = held, steps = new Uint16Array(Uint8Array.from(atob(text), c => c.charCodeAt(0)).buffer);
+      decoded.set(held, Float64Array.from(steps, count => count < 65535 ? low + step * count : NaN));
     }
-    return decoded.get(text);
+    return decoded.get(held);
   };
   const ticks = (low, high, most) => {
     const raw = (high - low) / most, ten = 10 ** Math.floor(Math.log10(raw));

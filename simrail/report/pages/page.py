@@ -49,6 +49,7 @@ from simrail.report.words.ablations import WORDS, state_words
 from simrail.report.words.findings import findings
 from simrail.report.words.geometry_findings import geometry_findings
 from simrail.report.words.sentences import Finding, axis_words
+from simrail.report.words.verdicts import imu_words, short_name
 from simrail.scenario.axes import each
 from simrail.scenario.build import Parts, goals_mm, limits_of
 from simrail.scenario.build_estimator import odometry_estimator
@@ -145,7 +146,7 @@ def _budget(data: PageData) -> list[Section]:
         return []
     first = own.iloc[0]
     method = next((one.label for one in data.styles if one.name == first["estimator"]), first["estimator"])
-    sentence = f"{budget_sentence(own)}, by {method} with {first['imu']} on {first['mount']}."
+    sentence = f"{budget_sentence(own)}, by {method} with {short_name(first['imu'])} on {first['mount']}."
     chart = canvas.drawn("budget", partial(budget_chart, own, sentence))
     return [_section("budget", "What the error is made of", sentence=sentence, chart=chart)]
 
@@ -289,7 +290,11 @@ def _said(data: PageData, case: Case) -> list[Finding]:
 def _case(data: PageData, case: Case) -> dict[str, Any]:
     """The tables of one case."""
     labels = case.labels
-    title = [labels["ride"], f"IMU {labels['mount']} ({labels['imu']})", f"odometry {labels['odometry']}"]
+    title = [
+        labels["ride"],
+        f"IMU {imu_words(labels)}",
+        f"odometry {labels['odometry']}",
+    ]
     title.append(state_words(labels))
     axes = [axis_words(*axis) for axis in case.axes.items()]
     tracks, draws = int(case.table["track_draws"].max()), int(case.table["draws"].max())

@@ -15,6 +15,7 @@ from simrail.report.tables.question import Question
 from simrail.report.words.ablations import value_words
 from simrail.report.words.findings import one_of_each
 from simrail.report.words.sentences import axis_words, recording_facts, vibration_facts
+from simrail.report.words.verdicts import short_name
 from simrail.scoring.ablations import AXES, MAP
 from simrail.track.bands import Band
 
@@ -107,9 +108,10 @@ def _picks(example: CellResult, errors: pd.Series, cells: pd.DataFrame) -> dict[
     draws = {"track_draw": "track", "sensor_draw": "sensors"}
     draw = ", ".join(f"{word} {cell[name]}" for name, word in draws.items() if name in cell) or "the only one"
     rank = _rank_words(cell.get("cell"), errors, cells)
+    imu = short_name(cell.get("imu", example.recording.imu_sheet.grade))
     return {
         "ride": ride_title(example),
-        "IMU": f"{cell.get('imu', example.recording.imu_sheet.grade)} on {example.recording.mount}",
+        "IMU": f"{imu} on {example.recording.mount}",
         "draw": f"{draw}: {rank}" if rank else draw,
     }
 

@@ -10,6 +10,7 @@ from simrail.report.tables.methods import MethodStyle
 from simrail.report.tables.pivot import Case, ablated, first_cases
 from simrail.report.tables.tables import Row, Table, method_row, number_cell
 from simrail.report.words.ablations import WORDS
+from simrail.report.words.verdicts import imu_words
 from simrail.scoring.ablations import Ablation
 from simrail.scoring.table import FULL
 
@@ -61,7 +62,7 @@ def pairs_of(all_cases: Sequence[Case], ablation: Ablation) -> list[Pairs]:
     for case in first_cases(all_cases):
         twin, labels = ablated(case, all_cases, ablation), case.labels
         if twin is not None:
-            words = [*[labels["vehicle"]] * several, f"IMU {labels['mount']} ({labels['imu']})"]
+            words = [*[labels["vehicle"]] * several, f"IMU {imu_words(labels)}"]
             words.append(f"odometry {labels['odometry']}")
             groups.setdefault(" \u00b7 ".join(words), []).append((case, twin))
     return [Pairs(title, ablation, pairs) for title, pairs in groups.items()]

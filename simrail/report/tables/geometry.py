@@ -12,6 +12,7 @@ from simrail.report.tables.methods import MethodStyle
 from simrail.report.tables.pivot import NOTHING, Case
 from simrail.report.tables.tables import DECIMALS, NONE, Cell, Row, Table, mean_cell, number_cell
 from simrail.report.words.ablations import state_words
+from simrail.report.words.verdicts import imu_words
 from simrail.scoring.table import FULL
 from simrail.track.bands import BANDS, Band
 from simrail.track.quality import Limits, section_indicators
@@ -205,7 +206,7 @@ def overview_table(
             cells += [mean_cell(own, mark=mark), mean_cell(zero, decimals=2)]
         note = ", an ablation" if labels["odometry"] == "truth" else ""
         label = (
-            f"{labels['ride']} \u00b7 {labels['mount']} ({labels['imu']}) \u00b7 {labels['odometry']}{note} "
+            f"{labels['ride']} \u00b7 {imu_words(labels)} \u00b7 {labels['odometry']}{note} "
             f"\u00b7 {state_words(labels)} \u00b7 {band_words(band, known)}"
         )
         if not all(cell.mark == "none" for cell in cells):

@@ -26,7 +26,10 @@ _FEW_SHADES = (0.0, 0.55, -0.35)
 """Shares of white, or of black, of up to three methods that would have one colour: the first keeps it."""
 _SHADES = (-0.3, 0.65)
 """Of more, from the darkest to the lightest; they stay beside those of their twins."""
-_APART = ("#0072B2", "#D55E00", "#56B4E9", "#E69F00", "#CC79A7", "#6350c4", "#a8326f", "#7b5e2a", "#999933")
+_APART = (
+    *("#0072B2", "#D55E00", "#56B4E9", "#E69F00", "#CC79A7"),
+    *("#6350c4", "#a8326f", "#7b5e2a", "#999933", "#661100"),
+)
 """Colours of methods of one class that nothing but their options tells apart; the first keeps its own."""
 _STROKES = ("-", (0, (5, 1.5)), (0, (1.2, 1.2)), (0, (6, 1.5, 1.2, 1.5)))
 _SPELLED = {word.lower(): word for word in ("Sabatini", "Yuan", "EKF", "GDA", "VQF", "AHRS", "KF", "IMU")}

@@ -13,6 +13,7 @@ import pandas as pd
 from simrail.report.tables.geometry import JUDGED, QUANTITIES, band_words
 from simrail.report.tables.methods import MethodStyle, readable
 from simrail.report.words.sentences import significant
+from simrail.report.words.verdicts import short_name
 from simrail.scoring.ablations import without_ablations
 from simrail.scoring.table import FULL
 from simrail.track.bands import BANDS, Band
@@ -169,9 +170,12 @@ def _question(rows: pd.DataFrame, words: str, unit: str, styles: Sequence[Method
     varying = [name for name in UNLIKE if name in rows and len(rows[name].unique()) > 1]
     between = {"mount": "on ", "vehicle": "of ", "odometry": "by "}
     named = [name for name in ("imu", "mount", "vehicle", "odometry") if name in varying] or ["imu"]
-    slot = rows[named[0]]
+    names = {imu: short_name(imu) for imu in rows["imu"].unique()}
+    # Two sheets of one name in two folders are told by their folders.
+    clear = rows.assign(imu=rows["imu"].map(names)) if len(set(names.values())) == len(names) else rows
+    slot = clear[named[0]]
     for name in named[1:]:
-        slot = slot + " " + between.get(name, "") + rows[name]
+        slot = slot + " " + between.get(name, "") + clear[name]
     rows = rows.assign(slot=slot, ideal=rows["imu"] == IDEAL)
     where = " in curves" if window == "curve" else ""
     figure, comma, metric = words.partition(",")

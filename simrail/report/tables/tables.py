@@ -8,6 +8,7 @@ from itertools import compress, groupby
 from simrail.report.tables.methods import MethodStyle
 from simrail.report.tables.pivot import Case, Mean
 from simrail.report.words.ablations import state_words
+from simrail.report.words.verdicts import imu_words
 
 
 @dataclass(frozen=True)
@@ -159,7 +160,7 @@ def odometry_table(all_cases: Sequence[Case]) -> Table:
                 mean_cell(case.get(name, "position", "coverage95"), decimals=1, scale=100.0),
             ]
             label = (
-                f"{case.labels['ride']} \u00b7 {case.labels['mount']} ({case.labels['imu']}) \u00b7 "
+                f"{case.labels['ride']} \u00b7 {imu_words(case.labels)} \u00b7 "
                 f"{name.removeprefix('odometry:')} \u00b7 {state_words(case.labels)}"
             )
             key = (label, *(cell.text for cell in cells))

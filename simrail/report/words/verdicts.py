@@ -1,6 +1,6 @@
 """Verdicts in words: which IMUs are good enough, of how many devices that is known, and what is open."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import pandas as pd
@@ -88,6 +88,11 @@ def share_words(row: pd.Series) -> str:
 def short_name(imu: object) -> str:
     """Name of an IMU, of a sheet of one's own that of its file without its folders."""
     return Path(str(imu)).name
+
+
+def imu_words(labels: Mapping[str, object]) -> str:
+    """Where an IMU is, and which it is: ``"axle (my_imu.toml)"``."""
+    return f"{labels['mount']} ({short_name(labels['imu'])})"
 
 
 def _names(imus: "pd.Series[str]") -> str:

@@ -21,7 +21,9 @@ def test_words_stay_inside_of_the_plan_and_off_each_other(name: str) -> None:
     both = drawn("plan", lambda: plan_figure(track, stops=stops)).split('class="narrow"')
     for svg, wide_in in zip(both, (WIDE_IN, NARROW_IN), strict=True):
         wide = 72.0 * wide_in
-        found = re.findall(r'font-size: ([\d.]+)px[^>]*translate\(([\d.-]+) ([\d.-]+)\)">(cant[^<]*)<', svg)
+        sizes = dict(re.findall(r"\.(\w+)\{[^}]*font-size: ([\d.]+)px", svg))
+        words = re.findall(r'class="(\w+)"[^>]*translate\(([\d.-]+) ([\d.-]+)\)">(cant[^<]*)<', svg)
+        found = [(sizes[look], x, y, word) for look, x, y, word in words]
         names = [
             (float(x), float(x) + LETTER_PT * float(size) * len(word), float(y)) for size, x, y, word in found
         ]

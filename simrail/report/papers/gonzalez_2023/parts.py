@@ -20,6 +20,7 @@ from simrail.report.tables.pivot import (
     first_cases,
 )
 from simrail.report.words.ablations import state_words
+from simrail.report.words.verdicts import imu_words
 from simrail.scenario.cells import Method, methods
 from simrail.scenario.imu_tables import NOISE
 from simrail.scoring.ablations import COLUMNS as TAKEN_AWAY
@@ -98,7 +99,7 @@ class Rows:
         """Which case is looked at, in words."""
         labels = self.case.labels
         return (
-            f"ride {labels['ride']}, IMU {labels['mount']} ({labels['imu']}), odometry {labels['odometry']}, "
+            f"ride {labels['ride']}, IMU {imu_words(labels)}, odometry {labels['odometry']}, "
             f"{state_words(labels, comma=', ')}"
         )
 
