@@ -14,6 +14,7 @@ import numpy.typing as npt
 from simrail.estimators.track_relative import states as at
 from simrail.estimators.track_relative.dual import Dual
 
+from simrail.core.columns import MAGNETIC
 from simrail.core.errors import InputError
 from simrail.core.jit import FloatArray
 from simrail.recording.recording import Recording
@@ -23,6 +24,9 @@ if TYPE_CHECKING:
 
 STANDS_MPS = 0.01
 """Standard deviation of the speed of a train that stands by its IMU: some millimetres are rolled unseen."""
+
+MAGNETIC_SD_RAD, MAGNETIC_S = 0.05, 100.0
+"""What iron and currents turn a magnetic heading by, and over how long that hangs together; synthetic."""
 
 ODOMETRY_S = 100.0
 """Over which the errors of an odometry without a wheel hang together: from one stop to the next."""
@@ -211,6 +215,54 @@ class Received:
     def shown(self, x: list[Dual]) -> list[Dual]:
         """`S`, m, and `V`, m/s."""
         return [x[at.S], x[at.V]]
+
+
+@dataclass(frozen=True)
+class MagneticHeading:
+    """How far a magnetic heading has left the map's since the first rest.
+
+    The level part of the field is found with the map's roll and pitch where the odometry is. What iron turns
+    it by all along is taken off as the mean over the rest at the start: a ride that does not begin with one
+    has no row. What changes of that is believed as much as what is new every `MAGNETIC_S`.
+    """
+
+    def rows(self, recording: Recording, steps: "Steps") -> Rows:
+        """Made from the first step on in which the train runs."""
+        field, sheet = recording.magnetometer, recording.magnetometer_sheet
+        if field is None or sheet is None:
+            raise InputError(
+                "the recording has no magnetometer",
+                field="magnetometer",
+                limit="a recording with a magnetometer",
+                remedy="add a [magnetometer] to the scenario or the ride file, or set magnetometer = false",
+            )
+        n = len(steps.time_s)
+        out = Rows(np.zeros((n, 1)), np.full((n, 1), math.inf))
+        running = np.flatnonzero(~steps.resting)
+        if len(running) == 0 or running[0] == 0:
+            return out
+        block = round(steps.dt * recording.imu_sheet.rate_hz)
+        samples = field[list(MAGNETIC)].to_numpy(dtype=np.float64)[: n * block]
+        x, y, z = samples.reshape(n, block, 3).mean(axis=1).T
+        track = recording.track
+        frame = track.frame(np.clip(steps.odometry[:, 0], track.start_m, track.end_m))
+        (sr, cr), (sp, cp) = ((np.sin(a), np.cos(a)) for a in (frame.roll_rad, frame.pitch_rad))
+        across = sr * y + cr * z
+        ahead, aside = cp * x + sp * across, cr * y - sr * z
+        away = sheet.north_rad - np.arctan2(aside, ahead) - frame.yaw_rad
+        first = running[0]
+        start = math.atan2(np.sin(away[:first]).mean(), np.cos(away[:first]).mean())
+        level = sheet.intensity_t * math.cos(sheet.inclination_rad)
+        white = sheet.noise_tpsqrthz / level
+        variance = (white**2 + 2.0 * MAGNETIC_SD_RAD**2 * MAGNETIC_S) / steps.dt
+        turned = frame.rates[:, 2] * steps.odometry[:, 3]
+        out.values[:, 0] = np.angle(np.exp(1j * (away - start)))
+        out.variances[first:, 0] = variance + (turned[first:] ** 2) * ODOMETRY_S / steps.dt
+        return out
+
+    def shown(self, x: list[Dual]) -> list[Dual]:
+        """`HEADING` and `YAW`, rad."""
+        return [x[at.HEADING] + x[at.YAW]]
 
 
 def _steps_after(time: FloatArray, steps: "Steps") -> npt.NDArray[np.int64]:

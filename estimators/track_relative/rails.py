@@ -6,7 +6,8 @@ rails are:
 * on an axle, whose wheels stand on them: at once;
 * on a bogie frame of full size of which the drawing has springs and masses: under them
   (`simrail.estimators.track_relative.under_frame`);
-* with a rail sensor, and on a mount of any other kind: as by the body itself.
+* with a rail sensor: by what it sees from the body, on a body of a model too;
+* on a mount of any other kind: as by the body itself.
 
 The map errs in its cant. What of that the smoother finds is no irregularity and is taken off, as is what a
 body leans on cant deficiency; how sure it is of the rest is its sd of the roll by the rails.
@@ -124,18 +125,21 @@ def rails_of(
     -------
     Estimate
         On a mount that is neither an axle nor a frame by the drawing, with the geometry as the smoother's
-        own states have it, and no draws.
+        own states have it, and no draws; unless it is of a model and sees its rails.
     """
     kind, scale = class_of(recording), scale_of(recording)
     if len(trace.states) < LEAST_STEPS:
         return replace(estimate, geometry=geometry_of(sight_of(estimate, recording), step_m=step_m))
-    if kind not in (AXLE, FRAME):
+    sees_as_a_model = scale != 1.0 and recording.rail_displacement is not None
+    if kind not in (AXLE, FRAME) and not sees_as_a_model:
         seen = sight_of(replace(estimate, states=_on_springs(recording, trace, estimate)), recording)
         return replace(estimate, geometry=geometry_of(seen, step_m=step_m))
     sheet, bogie = recording.vehicle_sheet, None
     if kind is FRAME and scale == 1.0 and sheet is not None and recording.rail_displacement is None:
         bogie = bogie_of(sheet, recording.mount_body)
-    motions, held = _motions(recording, trace, ASIDE_MPS2[kind], borne=bogie is not None, drawn=draws > 0)
+    motions, held = _motions(
+        recording, trace, ASIDE_MPS2.get(kind, 0.0), borne=bogie is not None, drawn=draws > 0
+    )
     sight, slow = _seen_from(recording, trace, estimate, motions)
     geometry, under = geometry_of(sight, step_m=step_m), None
     wheels = scale**3 * np.array(WHEELS_M3) / step_m
@@ -162,7 +166,10 @@ def _motions(
 ) -> tuple[Motions, Held | None]:
     """The motion, and what is held of a frame that is borne; chains only for draws: they are large."""
     waviness, held = Waviness().at_scale(scale_of(recording)), held_of(recording, trace)
-    sensor = recording.rail_displacement is not None
+    sensor, motion = recording.rail_displacement is not None, trace.course.motion
+    if motion.sway_hz > 0.0:
+        # A body on springs: what it does on them is not the rails', which it only has to look at.
+        waviness = replace(waviness, roll_sd=motion.roll_sd, y_sd=motion.y_sd, z_sd=motion.z_sd)
     chains = {
         "side": side_of(recording, held, waviness),
         "heave": heave_of(recording, held, waviness),

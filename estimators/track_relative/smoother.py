@@ -24,7 +24,7 @@ from typing import Any
 
 import numpy as np
 from simrail.estimators.track_relative import states as at
-from simrail.estimators.track_relative.aiding import Aiding, Received, aiding_of
+from simrail.estimators.track_relative.aiding import Aiding, MagneticHeading, Received, aiding_of
 from simrail.estimators.track_relative.kernel import (
     OUTPUTS,
     SEGMENT,
@@ -88,6 +88,8 @@ class TrackRelativeSmoother:
         False leaves encoder and odometer aside: an IMU and a map alone.
     gnss : bool
         Take place and speed of the recording's satellite receiver.
+    magnetometer : bool
+        Take the heading of the recording's magnetometer.
     aiding : tuple of Aiding
         What is measured beside what the recording has (`simrail.estimators.track_relative.aiding`).
     """
@@ -102,6 +104,7 @@ class TrackRelativeSmoother:
     draws: int = 0
     wheel: bool = True
     gnss: bool = False
+    magnetometer: bool = False
     aiding: tuple[Aiding, ...] = ()
 
     cites = ("briales_2021", "gonzalez_2023", "hartikainen_2010")
@@ -136,8 +139,8 @@ class TrackRelativeSmoother:
 
     @property
     def needs(self) -> tuple[str, ...]:
-        """A receiver, if it is asked for."""
-        return ("gnss",) if self.gnss else ()
+        """A receiver and a magnetometer, if they are asked for."""
+        return (*(("gnss",) if self.gnss else ()), *(("magnetometer",) if self.magnetometer else ()))
 
     @property
     def causal(self) -> bool:
@@ -199,8 +202,10 @@ class TrackRelativeSmoother:
         motion = motion_of(recording, self.motions()) if self.motion is None else self.motion
         if steps is None:
             steps = steps_of(recording, self.rate_hz, smoothed=self.smoothed)
-        received = (Received(),) if self.gnss else ()
-        aiding = (*aiding_of(recording, smoothed=self.smoothed), *received, *self.aiding)
+        asked: list[Aiding] = [Received()] if self.gnss else []
+        if self.magnetometer:
+            asked.append(MagneticHeading())
+        aiding = (*aiding_of(recording, smoothed=self.smoothed), *asked, *self.aiding)
         return course_of(recording, steps, motion, aiding, self.without.split())
 
     def trace(self, recording: Recording) -> Trace:

@@ -14,6 +14,7 @@ from simrail.estimators.track_relative import states as at
 from simrail.estimators.track_relative.aiding import (
     ODOMETRY_S,
     Fixes,
+    MagneticHeading,
     Odometer,
     OdometryPlace,
     Received,
@@ -27,8 +28,9 @@ from simrail.estimators.track_relative.smoother import TrackRelativeSmoother
 
 from simrail.core.errors import InputError
 from simrail.core.seeds import stream
-from simrail.recording.recording import OdometerSheet, Recording, beginning
+from simrail.recording.recording import MagnetometerSheet, OdometerSheet, Recording, beginning
 from simrail.sensors.gnss import GnssSpec, Outage, sample_gnss
+from simrail.sensors.magnetometer import MagnetometerSpec, sample_magnetometer
 
 
 def alone(recording: Recording) -> Recording:
@@ -180,6 +182,57 @@ def test_a_receiver_helps_when_it_is_asked_for(rough: Callable, rough_motion: Ca
     part = causal.estimate(beginning(seen, samples=5003)).states
     pd.testing.assert_frame_equal(whole.iloc[:5003], part, check_exact=True)
     with pytest.raises(InputError, match="no satellite receiver"):
+        causal.estimate(recording)
+
+
+def with_magnetometer(recording: Recording, motion: pd.DataFrame, *, turning_rad: float = 0.0) -> Recording:
+    """A field that iron turns by 0.3 rad all along, and by more from half of the ride on; no noise."""
+    spec = MagnetometerSpec(noise_tpsqrthz=0.0, bias_t=0.0)
+    turned, half = motion.copy(), 0.5 * motion.index[-1]
+    turned["yaw_rad"] += 0.3 + turning_rad * (motion.index > half)
+    field = sample_magnetometer(turned, recording.imu.index, spec, seed=4, draw=0, name="planted")
+    earth = spec.field
+    sheet = MagnetometerSheet(1e-8, earth.intensity_t, earth.inclination_rad, earth.north_rad)
+    return replace(recording, magnetometer=field, magnetometer_sheet=sheet)
+
+
+def test_a_magnetic_heading_is_of_how_far_it_left_the_map(rough: Callable, rough_motion: Callable) -> None:
+    """What iron turns all along is gone, what is planted later is in the rows; none at the start."""
+    recording, motion = rough(), rough_motion()
+    steps, kind = steps_of(recording, 25.0), MagneticHeading()
+    plain = kind.rows(with_magnetometer(recording, motion), steps)
+    (made,) = np.nonzero(np.isfinite(plain.variances[:, 0]))
+    assert steps.resting[: made[0]].all() and made[0] > 50
+    track = recording.track
+    true = (
+        np.interp(steps.time_s, motion.index, motion["yaw_rad"]) - track.frame(steps.odometry[:, 0]).yaw_rad
+    )
+    true -= true[: made[0]].mean()
+    # The body rolls by up to 5 mrad in the map's track, of which the dip makes up to twice as much.
+    np.testing.assert_allclose(plain.values[made, 0], true[made], atol=1e-2)
+    planted = kind.rows(with_magnetometer(recording, motion, turning_rad=0.1), steps)
+    late = steps.time_s > 0.5 * motion.index[-1] + 1.0
+    np.testing.assert_allclose((planted.values - plain.values)[late], 0.1, atol=1e-3)
+    states = stream(3, "states").standard_normal((4, at.STATES))
+    (heading,) = kind.shown(duals(states))
+    np.testing.assert_allclose(heading.value, states[:, at.HEADING] + states[:, at.YAW])
+
+
+def test_a_magnetometer_is_heard_when_it_is_asked_for(rough: Callable, rough_motion: Callable) -> None:
+    """Not otherwise, to the bit; a field that turns turns the heading; a filter looks at nothing later."""
+    recording, motion = rough(), rough_motion()
+    seen = with_magnetometer(recording, motion, turning_rad=0.5)
+    plain, _ = place_error(recording, motion)
+    unheard, _ = place_error(seen, motion)
+    pd.testing.assert_series_equal(plain, unheard, check_exact=True)
+    causal = TrackRelativeSmoother(smoothed=False, magnetometer=True, geometry_step_m=0.0)
+    assert causal.needs == ("magnetometer",)
+    whole = causal.estimate(seen).states
+    part = causal.estimate(beginning(seen, samples=5003)).states
+    pd.testing.assert_frame_equal(whole.iloc[:5003], part, check_exact=True)
+    still = causal.estimate(with_magnetometer(recording, motion)).states
+    assert whole["yaw_rad"].iloc[-1] - still["yaw_rad"].iloc[-1] > 2e-5
+    with pytest.raises(InputError, match="no magnetometer"):
         causal.estimate(recording)
 
 

@@ -17,10 +17,13 @@ from simrail.estimators.track_relative.noise import (
     BODY,
     FRAME,
     JOINTED,
+    MODEL_BODY,
+    MOST_DAMPING,
     SLOW_M,
     WAGON,
     Motion,
     at_scale,
+    model_body,
     motion_of,
 )
 from simrail.estimators.track_relative.prior import PARTS, first_state, heading_sd, noise_of, start_of
@@ -219,3 +222,12 @@ def test_a_waviness_of_a_scale_keeps_angles_and_its_own_metres() -> None:
     for name, value in asdict(sizes.at_scale(0.1)).items():
         scale = 1.0 if name in ("roll_sd", "pitch_sd") else 0.1
         assert value == pytest.approx(np.multiply(scale, getattr(sizes, name))), name
+
+
+def test_a_body_of_a_model_sways_as_fast_as_its_scale_and_moves_more() -> None:
+    """By the root of the scale; a damping stays one of a body that sways."""
+    model = model_body(BODY, 0.01)
+    assert model.sway_hz == pytest.approx(10.0 * BODY.sway_hz)
+    assert model.roll_sd == pytest.approx(MODEL_BODY["roll_sd"] * BODY.roll_sd)
+    assert model.rocking == model.heaving == 0.0
+    assert model_body(replace(BODY, damping=0.9), 0.01).damping == MOST_DAMPING
