@@ -53,8 +53,8 @@ ON_BOGIES = Pointing(0.06, 5e-5, 2e-6, 2.5e-4, 6.5, 1.0)
 
 OTHER_BODY = Pointing(0.6, 4e-4, 5e-5, 1e-3, 8.0, 7.0)
 """A body on one bogie, or between other bodies: its suspension turns with it, and it swings after a
-transition. The joints of a train of such bodies pitch it with its neighbours: on more than two bogies no
-drawing says how (`section_of`)."""
+transition. The joints of a train of such bodies pitch it with its neighbours (`section_of`), how stiffly no
+drawing says."""
 
 TURNED = Pointing(0.5, 7e-4, 5e-5, 1.5e-3, 10.0, 1.0)
 """On a vehicle of which rods let the axles yaw: little brings a frame back to the middle of a straight."""

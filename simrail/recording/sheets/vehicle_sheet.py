@@ -217,8 +217,8 @@ class VehicleSheet:
         """The chord of the section that a body is held in, in its own coordinates.
 
         Bodies that hang on each other and have two places to rest on in all lie in one plane: were their
-        joints to turn otherwise than in yaw, the section would fold. None for a body by itself, and where
-        more bear it.
+        joints to turn otherwise than in yaw, the section would fold. Of more places it is the straight line
+        of least squares through them, as where springs bear a stiff section alike. None for a body by itself.
         """
         here, names = self.body(body), self._hung_together(body)
         bearers = {
@@ -228,15 +228,22 @@ class VehicleSheet:
             for support in other.supports
             if support.on not in names
         }
-        if here is None or len(names) == 1 or len(bearers) != 2:
+        if here is None or len(names) == 1 or len(bearers) < 2:
             return None
-        (rear, lower), (front, upper) = sorted(bearers)
-        return Chord(
+        (rear, lower), *between, (front, upper) = sorted(bearers)
+        chord = Chord(
             centre_m=0.5 * (rear + front) - here.x_m,
             half_m=0.5 * (front - rear),
             half_wheelbase_m=0.5 * (self._half_wheelbase_m(lower) + self._half_wheelbase_m(upper)),
             sd_m=self.place_sd_m,
         )
+        if not between:
+            return chord
+        places = [x - here.x_m for x, _ in bearers]
+        mean = sum(places) / len(places)
+        spread = sum((x - mean) ** 2 for x in places)
+        weights = tuple((x, (x - mean) / spread) for x in sorted(places))
+        return replace(chord, centre_m=0.5 * sum(weight * x * x for x, weight in weights), weights=weights)
 
     def _hung_together(self, name: str) -> set[str]:
         """The bodies that joints connect with one, and itself."""

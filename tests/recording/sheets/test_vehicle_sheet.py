@@ -121,11 +121,23 @@ def test_hung_bodies_on_two_bogies_are_a_section() -> None:
     assert [CAR.section(name) for name in ("body", "front")] == [None] * 2
 
 
-def test_hung_bodies_on_more_bogies_may_fold() -> None:
-    """And what lies on a bolster right over its bogie does not hang on it."""
-    hung = SheetBody("more", -11.0, (Support("tail", 2.0), Support("three", -1.0)))
-    longer = VehicleSheet((*bogie("three", -12.0, 0.7), *ARTICULATED.bodies, hung))
-    assert [longer.section(name) for name in ("head", "tail", "more")] == [None] * 3
+def test_hung_bodies_on_more_bogies_lie_by_least_squares() -> None:
+    """On a cubic, through the bogies' middles: numpy's straight line."""
+    hung = SheetBody("more", -9.5, (Support("tail", -2.5), Support("last", 1.5)))
+    more = (
+        *bogie("three", -13.0, 0.7),
+        *ARTICULATED.bodies,
+        SheetBody("last", -12.0, (Support("three", -1.0),)),
+    )
+    longer, places = VehicleSheet((*more, hung)), np.array([6.0, -5.0, -13.0])
+    for name, x in (("head", 7.0), ("tail", -6.0), ("last", -12.0), ("more", -9.5)):
+        section = longer.section(name)
+        slope = sum(weight * cubic(x + at) for at, weight in section.weights)
+        assert slope == pytest.approx(np.polyfit(places, cubic(places), 1)[0], abs=1e-12), name
+
+
+def test_what_lies_right_over_its_support_does_not_hang() -> None:
+    """A car body on bolsters over its bogies is no section."""
     bolsters = tuple(SheetBody(f"{name} bolster", x, (Support(name, 0.0),)) for name, x in BOGIES)
     body = SheetBody("body", 0.5, (Support("front bolster", 8.5), Support("rear bolster", -7.5)))
     sheet = VehicleSheet((*CAR.bodies[:6], *bolsters, body))
