@@ -347,8 +347,8 @@ def _check_stuck(
     """Refuse a signal that repeats one number for seconds, although its sheet's noise is several counts.
 
     The device must show noise otherwise, on another axis meanwhile or on both sides: a computed ride has
-    none. An axis that lives on both sides as it does elsewhere is told from fewer samples, by the chance of so
-    many that are equal.
+    none. An axis that lives on both sides as it does elsewhere is told from fewer samples, by the chance that
+    so many are equal.
     """
     rate = _rate_of(time)
     noise = bounds.noise * np.sqrt(rate)
@@ -398,7 +398,7 @@ def _others(axis: int) -> list[int]:
 
 
 def _is_no_chance(step: FloatArray, first: int, end: int, noise: float) -> bool:
-    """Whether samples that are equal are no chance, by how often neighbours are equal near by and elsewhere."""
+    """Whether samples are not equal by chance, by how often neighbours are near by and elsewhere."""
     if end - first < STUCK_LEAST:
         return False
     same = step <= 1e-9 * noise

@@ -1,7 +1,7 @@
 """Was it measured once? Blocks of samples that stand twice in a signal, told by their noise.
 
-A logger that writes its buffer again, or who joins files that overlap, leaves samples that are those of another
-time to the last digit. No device repeats its noise, so a few samples in a row are enough.
+A logger that writes its buffer again, or who joins files that overlap, leaves samples that are those of
+another time to the last digit. No device repeats its noise, so a few samples in a row are enough.
 """
 
 import math
@@ -79,7 +79,7 @@ def check_twice(
 
 
 def _size(values: Sequence[FloatArray], noise: float, total: int) -> int | None:
-    """Samples in a row that no chance repeats in so many; None where decimals are too coarse, or nothing is noise.
+    """Samples in a row that no chance repeats in so many; None where decimals are too coarse to tell.
 
     Two samples of a noise s in steps d are equal by a chance of d / (2 sqrt(pi) s).
     """

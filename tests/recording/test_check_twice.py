@@ -44,7 +44,7 @@ def test_a_sound_signal_passes_with_few_decimals_and_with_many(seed: int, decima
 def test_a_device_that_hardly_lives_at_rest_is_not_told_of_its_decimals() -> None:
     """At rest the noise is a tenth of a step, so that blocks of one number stand there by chance."""
     values, rest = signal(), 0.001 * np.random.default_rng(1).standard_normal((1000, 3))
-    values[:1000] = np.round(rest + [0.004, 0.0, 9.81], 2)
+    values[:1000] = np.round(rest + np.array([0.004, 0.0, 9.81]), 2)
     judged(values)
     values[2500:2540] = values[1500:1540]
     with pytest.raises(InputError, match="40 samples"):

@@ -46,6 +46,17 @@ def turned(axis: int) -> Callable[[Recording, float], Recording]:
     return plant
 
 
+def apart(axis: int) -> Callable[[Recording, float], Recording]:
+    """A gyro that is turned so many degrees about X (0), Y (1) or Z (2) against its accelerometer."""
+
+    def plant(recording: Recording, degrees: float) -> Recording:
+        whole, imu = turned(axis)(recording, degrees), recording.imu.copy()
+        imu[list(GYRO)] = whole.imu[list(GYRO)]
+        return replace(recording, imu=imu)
+
+    return plant
+
+
 def clock(recording: Recording, seconds: float) -> Recording:
     """Stamps of the encoder to which `seconds` have to be added."""
     return _stamped(recording, lambda time: time - seconds)

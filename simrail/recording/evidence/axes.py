@@ -23,7 +23,17 @@ from simrail.core.columns import ACCEL, GYRO
 from simrail.core.jit import FloatArray
 from simrail.recording.evidence.finding import LIKELY, Finding, Verdict, verdict_of
 from simrail.recording.evidence.finding import SURE as CERTAIN
-from simrail.recording.evidence.model import ACCEL_GAIN, CUTS, GAINS, LATES, OF_CHANNEL, PACE, RAMPS, SLOW
+from simrail.recording.evidence.model import (
+    ACCEL_GAIN,
+    CUTS,
+    GAINS,
+    LATES,
+    OF_CHANNEL,
+    PACE,
+    RAMPS,
+    SLOW,
+    TURNS,
+)
 from simrail.recording.evidence.single import Single, Up, up_of
 from simrail.recording.evidence.slack import distance
 from simrail.recording.evidence.way import way_of
@@ -254,12 +264,16 @@ def _words(name: str) -> str:
         return f"{AXES[OF_CHANNEL[LATES.index(name)]].name}, late"
     if name in SLOW:
         return f"a low-pass in the {SENSORS[name]}"
+    if name in TURNS:
+        return f"a gyro that is turned against the accelerometer ({name.removeprefix('gyro_')})"
     return "another factor of the accelerometer" if name == ACCEL_GAIN else "stamps whose second is none"
 
 
 def of_all(name: str, single: Single) -> Finding:
     """The finding of a sensor, or of the time, that the fit has set free."""
     value, sd = single.told[name]
+    if name in TURNS:
+        return _apart(name, value, sd, single)
     if name in (*RAMPS, *CUTS):
         return _unsteady(name, value, sd, single)
     if name == PACE:
@@ -299,6 +313,27 @@ def of_all(name: str, single: Single) -> Finding:
         setting,
         field,
         remedy,
+    )
+
+
+def _apart(name: str, value: float, sd: float, single: Single) -> Finding:
+    """The finding of a gyro whose axes are turned against the accelerometer's."""
+    angle, by = name.removeprefix("gyro_"), math.degrees(1.0)
+    value = math.remainder(value, 2.0 * math.pi)
+    return Finding(
+        f"{angle} of the gyro beside the accelerometer",
+        name,
+        value * by,
+        sd * by,
+        0.0,
+        "deg",
+        "all of the ride",
+        _told(name, single),
+        f"the gyro is turned by {value * by:+.1f} deg of {angle} against the accelerometer, by how the line "
+        "rolls and bends",
+        f"imu.gyro.{angle}_deg",
+        f"imu.gyro.{angle}_deg",
+        _or(name, single),
     )
 
 

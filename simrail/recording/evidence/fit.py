@@ -36,6 +36,7 @@ from simrail.recording.evidence.model import (
     RAMPS,
     SINGLE,
     SLOW,
+    TURNS,
     Motion,
     Ride,
     blocks_of,
@@ -59,6 +60,7 @@ OUTLIER = 3.0
 
 FREE = {"wheel": 10.0, "shift": 3e3, "offset": 30.0, "drift": 1e-3, "gyro_offset": 30.0, "gyro": 30.0}
 FREE |= dict.fromkeys((*GAINS, PACE, ACCEL_GAIN, *LATES, *SLOW, *RAMPS, *CUTS), 30.0)
+FREE |= dict.fromkeys(TURNS, 3.0)
 """Prior sds of faults: so wide that they say nothing."""
 
 HELD = ("gyro_offset", *SINGLE, *RAMPS, *CUTS)
@@ -80,7 +82,9 @@ STOP_SD_RAD = 4e-3
 """Of roll and pitch where a train stands, beside the map's: 5 mm of level over two metres."""
 
 BEHIND_SD_M = 1.0
-"""How far from a body's reference point the place may be at which it turns, beside what is known of it."""
+"""How far from a body's reference point the place may be at which it turns, beside what is known of it. An
+axle turns with what holds it by its primary springs: a bogie, of half a wheelbase of 0.9 to 1.3 m, or a
+two-axle wagon, whose 3 m are three of these and are still explained better by a place than by a clock."""
 
 SLUGGISH_SD_S = 0.5
 """How late a body on springs may roll and pitch; it turns about Z with the track."""
@@ -386,12 +390,13 @@ def _nuisance(
         column[:last] = 0.0
         columns.append(column)
         sds.append(max(way, 1.0))
+    # What holds a body turns as at its own middle, and the body rolls and pushes where it is: that is a
+    # place, and no time.
+    column = np.zeros((len(place), CHANNELS))
+    column[:, GYRO_Z] = slopes[:, GYRO_Z, INDEX["shift"]]
+    columns.append(column)
+    sds.append(np.hypot(recording.mount_position_m[0], BEHIND_SD_M))
     if "gyro_offset" in free:
-        # A body turns as at its middle, and pushes as at the device: that is a place, and no time.
-        column = slopes[:, :, INDEX["shift"]].copy()
-        column[:, FORCE_X:] = 0.0
-        columns.append(column)
-        sds.append(np.hypot(recording.mount_position_m[0], BEHIND_SD_M))
         for channel in (GYRO_X, GYRO_Y):
             column = np.zeros((len(place), CHANNELS))
             column[:, channel] = slopes[:, channel, INDEX["gyro_offset"]]

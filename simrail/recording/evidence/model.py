@@ -19,8 +19,9 @@ the turns of the time t + gyro_offset where the clock of the gyro is another tha
 
 Faults of one axis, one sensor or the time itself are parameters too, each of which stays at its sound value
 unless a fit sets it free: a gain of one channel, a channel that is late alone, a sensor behind a low-pass of
-the first order, a factor of the accelerometer, and a pace: stamps of which one unit is no second, so V and A
-are pace and pace^2 times what they are by the stamps, while the way stays.
+the first order, a factor of the accelerometer, angles of the gyro against the accelerometer, and a pace:
+stamps of which one unit is no second, so V and A are pace and pace^2 times what they are by the stamps, while
+the way stays.
 
 Not here: motion of the body in the track, which averages out or is noise, and the height of the mount.
 """
@@ -55,7 +56,9 @@ OF_CHANNEL = (*GYRO, *ACCEL[:2])
 GAINS, LATES = (tuple(f"{what}_{name}" for name in OF_CHANNEL) for what in ("gain", "late"))
 SLOW, PACE, ACCEL_GAIN = ("slow_gyro", "slow_accel"), "pace", "accel"
 
-SINGLE = (*GAINS, *LATES, *SLOW, PACE, ACCEL_GAIN)
+TURNS = ("gyro_roll", "gyro_pitch", "gyro_yaw")
+
+SINGLE = (*GAINS, *LATES, *SLOW, PACE, ACCEL_GAIN, *TURNS)
 """Parameters of a fault of one axis, one sensor or the time: each free only where it is asked for."""
 
 RAMPS, CUTS = tuple(f"ramp_{name}" for name in OF_CHANNEL), ("cut_gyro", "cut_accel")

@@ -28,6 +28,7 @@ from simrail.recording.evidence.model import (
     PACE,
     RAMPS,
     SLOW,
+    TURNS,
     Ride,
     laters,
     motion_of,
@@ -101,12 +102,12 @@ def readings(ride: Ride, x: FloatArray, told: list[tuple[float, FloatArray]] | N
     by, later = dict(zip(GLOBALS, x.tolist(), strict=True)), laters(x)
     if told is None:
         told = [(seconds, when_of(ride, x, later_s=seconds)) for seconds in sorted(set(later.tolist()))]
-    turn = _turns(by)[0]
+    turn, turn_gyro = _turns(by)[0], _turns_gyro(by)[0]
     plain, parts = np.empty((len(ride.measured), CHANNELS)), []
     for seconds, said in told:
         channels = later == seconds
         part = _parts(ride, x, by, said)
-        plain[:, channels] = _device(_body(part, by), turn, by)[:, channels]
+        plain[:, channels] = _device(_body(part, by), turn, turn_gyro, by)[:, channels]
         parts.append((channels, part))
     gains = x[[INDEX[name] for name in GAINS]]
     grown = x[[INDEX[name] for name in RAMPS]] * _share(ride)[:, None]
@@ -207,26 +208,39 @@ def _turns(by: Mapping[str, float]) -> FloatArray:
     return found
 
 
-def _device(body: FloatArray, turn: FloatArray, by: Mapping[str, float]) -> FloatArray:
+def _turns_gyro(by: Mapping[str, float]) -> FloatArray:
+    """The same of the gyro, whose angles may be others than the accelerometer's."""
+    return _turns({angle: by[angle] + by[own] for angle, own in zip(_ANGLES, TURNS, strict=True)})
+
+
+def _device(body: FloatArray, turn: FloatArray, turn_gyro: FloatArray, by: Mapping[str, float]) -> FloatArray:
     """Readings (b, 5) of what a body does (b, 6), in the axes of a device."""
     read = np.empty((len(body), CHANNELS))
-    read[:, :FORCE_X] = by["gyro"] * (body[:, :3] @ turn)
+    read[:, :FORCE_X] = by["gyro"] * (body[:, :3] @ turn_gyro)
     read[:, FORCE_X:] = by[ACCEL_GAIN] * (body[:, _FORCE] @ turn[:, :2])
     return read
 
 
 def _linear(part: FloatArray, by: Mapping[str, float], wanted: set[str]) -> list[tuple[str, FloatArray]]:
     """Slopes (b, 5) by what the means over blocks are linear in, without gains of single channels."""
-    body, (turn, *turned) = _body(part, by), _turns(by)
-    found = [(name, _device(body, other, by)) for name, other in zip(_ANGLES, turned, strict=True)]
+    body, (turn, *turned), (turn_gyro, *turned_gyro) = _body(part, by), _turns(by), _turns_gyro(by)
+    found = [
+        (name, _device(body, other, other_gyro, by))
+        for name, other, other_gyro in zip(_ANGLES, turned, turned_gyro, strict=True)
+    ]
+    for name, other in zip(TURNS, turned_gyro, strict=True):
+        if name in wanted:
+            one = np.zeros((len(body), CHANNELS))
+            one[:, :FORCE_X] = _device(body, turn, other, by)[:, :FORCE_X]
+            found.append((name, one))
     for name, added in _SPRINGS.items():
         more = np.zeros_like(body)
         for to, of in added:
             more[:, to] = part[:, of]
-        found.append((name, _device(more, turn, by)))
+        found.append((name, _device(more, turn, turn_gyro, by)))
     for name, which in (("gyro", slice(0, FORCE_X)), (ACCEL_GAIN, slice(FORCE_X, CHANNELS))):
         if name in wanted:
             one = np.zeros((len(body), CHANNELS))
-            one[:, which] = _device(body, turn, {"gyro": 1.0, ACCEL_GAIN: 1.0})[:, which]
+            one[:, which] = _device(body, turn, turn_gyro, {"gyro": 1.0, ACCEL_GAIN: 1.0})[:, which]
             found.append((name, one))
     return found

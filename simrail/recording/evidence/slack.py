@@ -16,6 +16,7 @@ from simrail.recording.evidence.model import (
     PACE,
     RAMPS,
     SLOW,
+    TURNS,
     Ride,
     motion,
     start_values,
@@ -34,6 +35,10 @@ AHEAD_SHARE = 0.5
 RAMP_SD_RADPS, RAMP_SD_MPS2, CUT_SD_RADPS = 2e-3, 0.05, 0.01
 """Of an offset, over a ride, beside what its sheet calls instability: warming up; and of the corner of a
 high-pass: one of 100 s."""
+
+TURN_SD_RAD = math.radians(0.5)
+"""Of the gyro against the accelerometer, beside the package: what cant that is wrong, and a body that leans
+and squats, leave of a roll or a pitch."""
 
 PACE_SD = 0.003
 """Of stamps, beside their clock: as little as the factor of a gyro, which a pace is much like."""
@@ -80,6 +85,7 @@ def slack_of(ride: Ride, found: Fit) -> dict[str, float]:
         scale = sheet.gyro_scale_error if channel <= GYRO_Z else sheet.accel_scale_error
         slack[gain] = math.hypot(scale / math.sqrt(3.0), GAIN_SD)
         slack[late] = clock_slack(ride)
+    slack |= dict.fromkeys(TURNS, math.hypot(package, TURN_SD_RAD))
     slack[ACCEL_GAIN] = math.hypot(sheet.accel_scale_error / math.sqrt(3.0), GAIN_SD)
     slack[PACE] = math.hypot(PACE_SD, bent)
     for channel, ramp in enumerate(RAMPS):
