@@ -19,6 +19,7 @@ from simrail.core.jit import FloatArray
 from simrail.recording.evidence.finding import LIKELY, Finding, Verdict, verdict_of
 from simrail.recording.evidence.fit import Fit, fit, hints
 from simrail.recording.evidence.line import K3
+from simrail.recording.evidence.midway import change_of
 from simrail.recording.evidence.model import (
     CUTS,
     GAINS,
@@ -233,6 +234,18 @@ class _Fits(NamedTuple):
 
 
 def _explained(ride: Ride) -> tuple[Ride, _Fits]:
+    """A ride and its fits; with what changes within it, if something does."""
+    ride, fits = _unchanging(ride)
+    if ride.slides or ride.drift or PACE in fits.single.free:
+        return ride, fits
+    changed = change_of(ride, fits.best, fits.blamed(ride))
+    if changed is None:
+        return ride, fits
+    other, single = changed
+    return other, _Fits(single.found, single.found, single, single.found)
+
+
+def _unchanging(ride: Ride) -> tuple[Ride, _Fits]:
     """A ride and its fits; by other stamps, or without what its wheel says while it slides, if that is it."""
     one = best_fit(ride)
     two = apart_fit(ride, one)

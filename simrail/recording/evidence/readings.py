@@ -6,7 +6,7 @@ clocks follow from one another, and but three differences are taken: by the whee
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.signal import lfilter
@@ -28,10 +28,13 @@ from simrail.recording.evidence.model import (
     PACE,
     RAMPS,
     SLOW,
+    THEN,
     TURNS,
     Ride,
+    after,
     laters,
     motion_of,
+    way_then,
     when_of,
 )
 
@@ -73,6 +76,8 @@ class Readings:
         Readings without gains of single channels, and without bias.
     expected : ndarray (b, 5)
         Readings.
+    then : Readings, optional
+        What it reads from `Ride.then` on, where something changes; ``expected`` holds that already.
     """
 
     by: Mapping[str, float]
@@ -80,6 +85,7 @@ class Readings:
     parts: list[tuple[np.ndarray, FloatArray]]
     plain: FloatArray
     expected: FloatArray
+    then: "Readings | None" = None
 
 
 def expected(ride: Ride, x: FloatArray) -> FloatArray:
@@ -99,6 +105,16 @@ def readings(ride: Ride, x: FloatArray, told: list[tuple[float, FloatArray]] | N
     told : list of (float, ndarray), optional
         What the way says, from parameters with the same clocks.
     """
+    here = _steady(ride, x, told)
+    if ride.then is None:
+        return here
+    then = _steady(ride, after(ride, x), told if x[INDEX["then_offset"]] == 0.0 else None)
+    joined = np.concatenate([here.expected[: ride.then], then.expected[ride.then :]])
+    return replace(here, expected=joined, then=then)
+
+
+def _steady(ride: Ride, x: FloatArray, told: list[tuple[float, FloatArray]] | None) -> Readings:
+    """What a device reads if nothing changes within the ride."""
     by, later = dict(zip(GLOBALS, x.tolist(), strict=True)), laters(x)
     if told is None:
         told = [(seconds, when_of(ride, x, later_s=seconds)) for seconds in sorted(set(later.tolist()))]
@@ -128,8 +144,22 @@ def slopes(ride: Ride, x: FloatArray, here: Readings, solved_for: IntArray) -> F
     solved_for : ndarray (m,)
         Which of them.
     """
+    found = _slopes(ride, x, here, {GLOBALS[i] for i in solved_for})
+    if ride.then is None or here.then is None:
+        return found
+    first, wanted = ride.then, {GLOBALS[i] for i in solved_for}
+    found[first:] = _slopes(ride, after(ride, x), here.then, wanted)[first:]
+    for name, of in THEN.items():
+        found[first:, :, INDEX[name]] = found[first:, :, INDEX[of]]
+    found[first:, :, INDEX["then_wheel"]] -= way_then(ride, x) * found[first:, :, INDEX["shift"]]
+    return found
+
+
+def _slopes(ride: Ride, x: FloatArray, here: Readings, wanted: set[str]) -> FloatArray:
+    """Slopes (b, 5, len(GLOBALS)) if nothing changes within the ride."""
+    steady = _steady(ride, x, here.told).expected if ride.then is not None else here.expected
     found = np.zeros((*here.plain.shape, len(GLOBALS)))
-    by, wanted = here.by, {GLOBALS[i] for i in solved_for}
+    by = here.by
     gains = x[[INDEX[name] for name in GAINS]]
     for channels, part in here.parts:
         for name, values in _linear(part, by, wanted):
@@ -139,7 +169,7 @@ def slopes(ride: Ride, x: FloatArray, here: Readings, solved_for: IntArray) -> F
             other = x.copy()
             other[INDEX[name]] += step
             told = None if name == "offset" else here.told
-            found[:, :, INDEX[name]] = (readings(ride, other, told).expected - here.expected) / step
+            found[:, :, INDEX[name]] = (_steady(ride, other, told).expected - steady) / step
     # What a clock of one sensor does, another's does the other way; and a drift is an offset that grows.
     earlier, middles = found[:, :, INDEX["offset"]], ride.fine_s[FINE // 2 :: FINE] - ride.middle_s
     found[:, :, INDEX["drift"]] = earlier * middles[:, None]

@@ -88,6 +88,8 @@ class Single:
         How far each may be off in a sound ride, besides.
     rivals : tuple of str
         What explains the ride nearly as well as the last of those that are free.
+    changed_s : float, optional
+        Time stamp of the IMU from which on they hold, where they begin within the ride.
     """
 
     found: Fit
@@ -95,6 +97,7 @@ class Single:
     told: dict[str, tuple[float, float]]
     slack: dict[str, float]
     rivals: tuple[str, ...] = ()
+    changed_s: float | None = None
 
     def off(self, name: str) -> float:
         """How many standard deviations one of those that were looked at is off."""
