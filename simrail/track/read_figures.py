@@ -79,8 +79,8 @@ def _doubts(drawn: Drawn, radius: float, cant: float, slope: float) -> list[str]
         balanced = 3.6 * math.sqrt(9.81 * radius * cant / drawn.rail_base_m)
         if balanced < BALANCED_KMH:
             doubts.append(
-                f"a cant of {1e3 * cant:.3g} mm at a radius of {radius:.4g} m balances {balanced:.2g} km/h: is "
-                "it in inches, 'cant [in]', or in cm?"
+                f"a cant of {1e3 * cant:.3g} mm at a radius of {radius:.4g} m balances {balanced:.2g} km/h: "
+                "is it in inches, 'cant [in]'?"
             )
     if slope > STEEPEST:
         doubts.append(f"a gradient of {1e3 * slope:.3g} permil is steeper than any railway's: or is it %?")
