@@ -44,7 +44,6 @@ def sound() -> Recording:
                 ("then_roll", midway(turned(0)), 45.0, 45.0, 0.3),
                 ("then_offset", missing, 2.0, -2.0, 0.15),
                 ("then_wheel", counted_otherwise, 0.5, 1.0, 0.1),
-                ("then_wheel", counted_otherwise, -1.0, -2.0, 0.1),
             ]
         ),
     ],

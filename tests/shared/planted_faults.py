@@ -86,7 +86,7 @@ def missing(recording: Recording, seconds: float, share: float = 0.5) -> Recordi
 
 
 def counted_otherwise(recording: Recording, factor: float, share: float = 0.5) -> Recording:
-    """A counter that counts so many times as much from a share of the ride on; below 0, the other way."""
+    """A counter that counts so many times as much from a share of the ride on."""
     assert recording.encoder is not None
     counts = recording.encoder["pulse_count"].to_numpy().astype(np.float64, copy=True)
     first = round(share * len(counts))
