@@ -92,9 +92,9 @@ def mended(data: dict[str, Any], evidence: Evidence) -> list[str]:
         found = {key: wrong[f"{mark}{key}"].value for key in ANGLES if f"{mark}{key}" in wrong}
         if found:
             _turn(data, table, found, changes)
-        apart = {key: wrong[f"{mark}gyro_{key}"].value for key in ANGLES if f"{mark}gyro_{key}" in wrong}
-        if apart:
-            _turn(data, f"{table}.gyro", apart, changes)
+        beside = {key: wrong[f"{mark}gyro_{key}"].value for key in ANGLES if f"{mark}gyro_{key}" in wrong}
+        if beside:
+            _turn(data, f"{table}.gyro", beside, changes)
     if "wheel" in wrong:
         _mend_wheel(data, wrong["wheel"], changes)
     if "shift" in wrong:
