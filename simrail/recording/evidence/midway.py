@@ -145,7 +145,7 @@ def _start(group: tuple[str, ...], found: Fit) -> FloatArray:
 
 def _moments(count: int, most: int) -> list[int]:
     """Blocks at which a change is looked for."""
-    return np.unique(np.linspace(ENDS, count - ENDS, most).astype(np.int64)).tolist()
+    return sorted({int(place) for place in np.linspace(ENDS, count - ENDS, most)})
 
 
 class _Left:
