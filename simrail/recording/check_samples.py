@@ -18,6 +18,7 @@ import numpy.typing as npt
 from simrail.core.errors import InputError
 from simrail.core.jit import FloatArray
 from simrail.core.resample import MOST_LOST
+from simrail.recording.check_twice import CHANCE, check_twice
 from simrail.recording.recording import ImuSheet, MagnetometerSheet
 
 APART = 10.0
@@ -40,6 +41,9 @@ STUCK_S, STUCK_SAMPLES = 2.0, 60
 sample equals the last is 0.65 even where the noise is a fifth of its sheet's, so 6e-12 of sixty."""
 
 STUCK_COUNTS = 2.0
+
+STUCK_LEAST = 15
+"""Samples that are equal, below which nothing is called stuck: a small part of a ride, and soon over."""
 
 HELD_SAMPLES = 10
 """So many times in a row no living device repeats all three axes at once: of three whose noise is a fifth of
@@ -141,7 +145,8 @@ def check_samples(
     InputError
         At the first of: zeros on all axes at once amid a signal; samples beyond the range that stand apart
         from the rest; numbers that mark missing samples; one number for seconds, where the sheet has noise;
-        all axes of an IMU repeated, ten times in a row or in more than `MOST_LOST` of the samples.
+        all axes of an IMU repeated, ten times in a row or in more than `MOST_LOST` of the samples; a block
+        of its samples that stands twice.
     """
 
     def place(sample: int) -> str:
@@ -159,6 +164,7 @@ def check_samples(
             _check_steps(channel, _COARSE[kind], place, file)
     if kind != "field":  # a slow magnetometer is often logged at the rate of the IMU
         _check_held(channels, bounds, time, place, file)
+        _check_twice(channels, bounds, time, place, file)
 
 
 def _check_copies(channels: tuple[Channel, ...], file: str | None) -> None:
@@ -303,6 +309,28 @@ def _check_zeros(
         )
 
 
+def _check_twice(
+    channels: tuple[Channel, ...],
+    bounds: Bounds,
+    time: FloatArray,
+    place: Callable[[int], str],
+    file: str | None,
+) -> None:
+    """Refuse a device that lives and holds the same samples at two times."""
+    noise = bounds.noise * np.sqrt(_rate_of(time))
+    if noise == 0.0 or len(time) <= STUCK_SAMPLES:
+        return
+    if all(float(np.diff(channel.values, n=2).std()) > LIVING * noise for channel in channels):
+        check_twice(
+            [channel.name for channel in channels],
+            [channel.values for channel in channels],
+            float(noise),
+            place,
+            time,
+            file,
+        )
+
+
 def _rate_of(time: FloatArray) -> float:
     """Samples per second; 0 of stamps that go back, or are none, which are refused elsewhere."""
     span = float(time[-1] - time[0]) if len(time) else 0.0
@@ -319,12 +347,13 @@ def _check_stuck(
     """Refuse a signal that repeats one number for seconds, although its sheet's noise is several counts.
 
     The device must show noise otherwise, on another axis meanwhile or on both sides: a computed ride has
-    none.
+    none. An axis that lives on both sides as it does elsewhere is told from fewer samples, by the chance that
+    so many are equal.
     """
     rate = _rate_of(time)
     noise = bounds.noise * np.sqrt(rate)
     shortest = max(STUCK_SAMPLES, int(np.ceil(STUCK_S * rate)))
-    if noise == 0.0 or len(time) <= shortest:
+    if noise == 0.0 or len(time) <= STUCK_SAMPLES:
         return
     steps = [np.abs(np.diff(channel.values)) for channel in channels]
     counts = [float(step[step > 1e-9 * noise].min(initial=np.inf)) for step in steps]
@@ -340,12 +369,16 @@ def _check_stuck(
         moves = np.concatenate([[-1], np.flatnonzero(step > 1e-9 * noise), [len(step)]])
         longest = int(np.argmax(np.diff(moves)))
         first, end = int(moves[longest]) + 1, min(int(moves[longest + 1]) + 1, len(time))
-        if end - first < shortest or noise < STUCK_COUNTS * count:
+        if noise < STUCK_COUNTS * count:
             continue
-        others = any(lives(other, first, end) for other in range(len(channels)) if other != axis)
+        held, least, most = channel.values[first], channel.values.min(), channel.values.max()
+        ends = least < most and held in (least, most)
+        if end - first < shortest:
+            alone = all(np.any(steps[other][first : end - 1] > 1e-9 * noise) for other in _others(axis))
+            if ends or not alone or not _is_no_chance(step, first, end, noise):
+                continue
+        others = any(lives(other, first, end) for other in _others(axis))
         if others or (lives(axis, first - STUCK_SAMPLES, first) and lives(axis, end, end + STUCK_SAMPLES)):
-            held, least, most = channel.values[first], channel.values.min(), channel.values.max()
-            ends = least < most and held in (least, most)
             raise InputError(
                 f"repeats one number from {place(first)} to time_s = {time[end - 1]:.6g}; the device is "
                 + ("saturated: it shows nothing beyond that" if ends else "stuck"),
@@ -357,6 +390,23 @@ def _check_stuck(
                 if ends
                 else "cut the recording there, or mend the logger",
             )
+
+
+def _others(axis: int) -> list[int]:
+    """The other axes of a triad."""
+    return [other for other in range(3) if other != axis]
+
+
+def _is_no_chance(step: FloatArray, first: int, end: int, noise: float) -> bool:
+    """Whether samples are not equal by chance, by how often neighbours are near by and elsewhere."""
+    if end - first < STUCK_LEAST:
+        return False
+    same = step <= 1e-9 * noise
+    near = np.concatenate([same[max(0, first - STUCK_SAMPLES) : first], same[end - 1 : end + STUCK_SAMPLES]])
+    if len(near) < STUCK_SAMPLES:
+        return False
+    chance = max((float(part.sum()) + 2.0) / (len(part) + 4.0) for part in (near, same))
+    return bool(len(same) * chance ** (end - first - 1) < CHANCE)
 
 
 def _check_steps(channel: Channel, coarse: float, place: Callable[[int], str], file: str | None) -> None:

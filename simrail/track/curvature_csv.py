@@ -22,6 +22,7 @@ from simrail.core.errors import InputError
 from simrail.core.jit import FloatArray
 from simrail.track.design import CantStation
 from simrail.track.drawn import Drawn, Piece, Turn
+from simrail.track.read_figures import missing_rows
 
 _NAMES = {
     "position": ("s", "x", "position", "distance", "chainage", "station", "km", "mileage", "location"),
@@ -62,9 +63,12 @@ def read_curvature_csv(path: Path) -> Drawn:
             field=f"row {int(fallen[0]) + 3}",
             value=float(s[fallen[0] + 1]),
             limit="places that rise or stay",
+            remedy="sort the rows by place; a line against its chainage wants places of its own, and "
+            "curvature and cant of the other sign",
         )
     drawn = Drawn(path.stem, f"table {path.name}", float(s[0]), [])
     drawn.notes.append(f"columns known by name: {words}")
+    drawn.notes += missing_rows(s)
     if "curvature" in table:
         bend = table["curvature"]
     elif "radius" in table:
@@ -73,7 +77,12 @@ def read_curvature_csv(path: Path) -> Drawn:
         bend = np.where(straight, 0.0, 1.0 / np.where(straight, 1.0, radius))
         rounding["curvature"] = 0.0
     else:
-        raise InputError("has no curvature", field="columns", limit="curvature [1/m], or radius [m]")
+        raise InputError(
+            "has no curvature that is known by its name",
+            field="columns",
+            limit="curvature [1/m], or radius [m]",
+            remedy="a degree of curve D (of a chord of 100 ft) is a radius of 15.24 m / sin(D / 2)",
+        )
     joints = _joints(s, bend, _TOLERANCE["curvature"] + rounding["curvature"])
     drawn.pieces = [Piece(b - a, k0, k1) for (a, k0), (b, k1) in itertools.pairwise(joints) if b > a]
     _add_cant(drawn, table, s, bend, rounding)
@@ -144,8 +153,15 @@ def _number(cell: str, row: int, name: str, quantity: str) -> float:
     except ValueError:
         value = np.nan
     if not np.isfinite(value) and quantity != "radius":
+        station = re.fullmatch(r"(\d+)\+(\d{3}(?:\.\d*)?)", cell)
         raise InputError(
-            "is no number", field=f"{name.strip()}, row {row + 2}", value=cell, limit="a finite number"
+            "is no number",
+            field=f"{name.strip()}, row {row + 2}",
+            value=cell,
+            limit="a finite number",
+            remedy=f"write metres: {cell} is {1000 * int(station[1]) + float(station[2]):g}"
+            if station
+            else "",
         )
     return value
 

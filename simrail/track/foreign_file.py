@@ -11,6 +11,7 @@ from simrail.track.design import TrackDesign
 from simrail.track.drawn import drawn_design
 from simrail.track.ifc import read_ifc
 from simrail.track.landxml import read_landxml
+from simrail.track.read_figures import figures_of
 
 LANDXML, IFC, TABLES = (".xml", ".landxml"), (".ifc",), (".csv", ".txt", ".tsv")
 
@@ -32,7 +33,7 @@ def design_from_file(
     Raises
     ------
     InputError
-        If there is no such file, or it describes no line.
+        If there is no such file, or it describes no line, or one that no railway has.
     """
     ending = path.suffix.lower()
     if ending not in LANDXML + IFC + TABLES:
@@ -57,4 +58,5 @@ def design_from_file(
             drawn = read_curvature_csv(path)
         else:
             drawn = (read_landxml if ending in LANDXML else read_ifc)(path, alignment=alignment)
-        return drawn_design(drawn, step_smoothing_m=step_smoothing_m), drawn.notes
+        figures = figures_of(drawn)
+        return drawn_design(drawn, step_smoothing_m=step_smoothing_m), [*drawn.notes, *figures]

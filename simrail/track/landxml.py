@@ -208,6 +208,13 @@ def _curve(element: ET.Element, unit: float) -> _Part:
     start, centre, end = (at.get(key) for key in ("Start", "Center", "End"))
     first = last = turn = None
     if start is not None and centre is not None and end is not None:
+        if centre in (start, end):
+            raise InputError(
+                "has its centre at an end",
+                field="Curve.Center",
+                value=(element.findtext("{*}Center") or "").strip(),
+                limit="a point beside the arc, north before east",
+            )
         first, last = _angle(side * 1j * (start - centre)), _angle(side * 1j * (end - centre))
         turned = (end - centre) / (start - centre)
         turn = (side * math.atan2(turned.imag, turned.real)) % (2.0 * math.pi)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -100,6 +101,8 @@ def test_where_speed_and_push_do_not_tell_a_late_gyro_from_another_place_both_ar
     evidence = weigh(replace(sound, imu=imu, encoder=encoder, start_position_m=0.0))
     found = evidence.of("shift")
     assert found.wrong and "imu.gyro.time_offset_s" in found.remedy
+    late = re.search(r"gyro are (\d\.\d+) s late", found.remedy)
+    assert late is not None and float(late[1]) == pytest.approx(3.0, abs=0.5)
     assert evidence.of("gyro_offset").verdict == "could not be judged"
 
 

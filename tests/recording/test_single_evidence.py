@@ -17,7 +17,7 @@ from simrail.recording.evidence.judge import Evidence
 from simrail.recording.files.mend import write_mended
 from simrail.recording.files.ride_reader import read_signals
 from simrail.recording.recording import Recording
-from tests.shared.planted_faults import axis, exchanged, gyro, late, pace, slipping, slow
+from tests.shared.planted_faults import apart, axis, exchanged, gyro, late, pace, slipping, slow
 
 BASE = Path(__file__).parents[1] / "field" / "cases" / "00-base"
 
@@ -130,8 +130,8 @@ def test_a_filter_that_takes_off_what_is_slow_is_told_with_its_corner(
 
 @pytest.mark.long
 def test_a_ride_that_no_single_mistake_explains_is_not_mended_by_figures(sound: Recording) -> None:
-    """A mean over two seconds: speeds, places and clocks come out wrong, and none of them is."""
-    smooth = sound.imu.rolling(41, center=True, min_periods=1).mean()
+    """A mean over three seconds: speeds, places and clocks come out wrong, and none of them is."""
+    smooth = sound.imu.rolling(61, center=True, min_periods=1).mean()
     (found,) = weigh_all(replace(sound, imu=smooth)).wrong
     assert found.key == "at_once" and not found.setting and "filter" in found.remedy
 
@@ -141,6 +141,30 @@ def test_a_ride_that_no_single_mistake_explains_is_not_mended_by_figures(sound: 
 def test_a_low_pass_is_no_clock(columns: tuple[str, ...], key: str, sound: Recording) -> None:
     evidence = weigh_all(slow(columns)(sound, 0.5))
     assert_told(evidence, key, 0.5, 0.1, "low-pass of 0.3")
+
+
+@pytest.mark.parametrize(
+    ("about", "degrees"),
+    [
+        (2, 5.0),
+        *(pytest.param(*planted, marks=LONG) for planted in [(0, -4.0), (1, 15.0), (2, -45.0), (0, 45.0)]),
+    ],
+)
+def test_a_gyro_that_is_turned_against_its_accelerometer_is_told_and_mended(
+    about: int, degrees: float, sound: Recording, tmp_path: Path
+) -> None:
+    """Two boards of one box. The slack is four times the sd of the fit, a quarter of a degree."""
+    evidence = weigh_all(apart(about)(sound, degrees))
+    angle = ("roll", "pitch", "yaw")[about]
+    assert_told(evidence, f"gyro_{angle}", degrees, 1.0, "turned by")
+    (tmp_path / "ride.csv").write_text((BASE / "ride.csv").read_text())
+    (tmp_path / "ride.toml").write_text((BASE / "ride.toml").read_text())
+    (change,) = write_mended(tmp_path / "ride.toml", evidence, tmp_path / "mended.toml")
+    assert change.startswith(f"imu.gyro.{angle}_deg")
+    # The file is sound, and so its gyro is turned the other way by what mends the planted one.
+    back = apart(about)(sound, -evidence.of(f"gyro_{angle}").value)
+    read = read_signals(tmp_path / "mended.toml")
+    np.testing.assert_allclose(read.imu, back.imu, atol=1e-4)
 
 
 @pytest.mark.parametrize(

@@ -46,6 +46,54 @@ def turned(axis: int) -> Callable[[Recording, float], Recording]:
     return plant
 
 
+def apart(axis: int) -> Callable[[Recording, float], Recording]:
+    """A gyro that is turned so many degrees about X (0), Y (1) or Z (2) against its accelerometer."""
+
+    def plant(recording: Recording, degrees: float) -> Recording:
+        whole, imu = turned(axis)(recording, degrees), recording.imu.copy()
+        imu[list(GYRO)] = whole.imu[list(GYRO)]
+        return replace(recording, imu=imu)
+
+    return plant
+
+
+def midway(plant: Callable[[Recording, float], Recording], share: float = 0.5) -> Callable[..., Recording]:
+    """A fault of the IMU from a share of the ride on."""
+
+    def later(recording: Recording, size: float) -> Recording:
+        imu, first = recording.imu.copy(), round(share * len(recording.imu))
+        imu.iloc[first:] = plant(recording, size).imu.iloc[first:]
+        return replace(recording, imu=imu)
+
+    return later
+
+
+def offset(column: str) -> Callable[[Recording, float], Recording]:
+    """One axis of an IMU that reads so much more than it should, SI."""
+
+    def plant(recording: Recording, more: float) -> Recording:
+        return replace(recording, imu=recording.imu.assign(**{column: recording.imu[column] + more}))
+
+    return plant
+
+
+def missing(recording: Recording, seconds: float, share: float = 0.5) -> Recording:
+    """So many seconds of the IMU's samples that were lost, while stamps go on: counted samples hide a gap."""
+    first, count = round(share * len(recording.imu)), round(seconds * recording.imu_sheet.rate_hz)
+    values, imu = recording.imu.to_numpy(), recording.imu.iloc[: len(recording.imu) - count].copy()
+    imu.iloc[first:] = values[first + count :]
+    return replace(recording, imu=imu)
+
+
+def counted_otherwise(recording: Recording, factor: float, share: float = 0.5) -> Recording:
+    """A counter that counts so many times as much from a share of the ride on."""
+    assert recording.encoder is not None
+    counts = recording.encoder["pulse_count"].to_numpy().astype(np.float64, copy=True)
+    first = round(share * len(counts))
+    counts[first:] = counts[first] + factor * (counts[first:] - counts[first])
+    return replace(recording, encoder=recording.encoder.assign(pulse_count=np.rint(counts).astype(np.int64)))
+
+
 def clock(recording: Recording, seconds: float) -> Recording:
     """Stamps of the encoder to which `seconds` have to be added."""
     return _stamped(recording, lambda time: time - seconds)

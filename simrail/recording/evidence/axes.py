@@ -23,7 +23,18 @@ from simrail.core.columns import ACCEL, GYRO
 from simrail.core.jit import FloatArray
 from simrail.recording.evidence.finding import LIKELY, Finding, Verdict, verdict_of
 from simrail.recording.evidence.finding import SURE as CERTAIN
-from simrail.recording.evidence.model import ACCEL_GAIN, CUTS, GAINS, LATES, OF_CHANNEL, PACE, RAMPS, SLOW
+from simrail.recording.evidence.model import (
+    ACCEL_GAIN,
+    CUTS,
+    GAINS,
+    LATES,
+    OF_CHANNEL,
+    PACE,
+    RAMPS,
+    SLOW,
+    THEN,
+    TURNS,
+)
 from simrail.recording.evidence.single import Single, Up, up_of
 from simrail.recording.evidence.slack import distance
 from simrail.recording.evidence.way import way_of
@@ -99,6 +110,9 @@ APART = 1.5
 ALL_ACCEL = "factor of the accelerometer"
 
 SENSORS = {SLOW[0]: "gyro", SLOW[1]: "accelerometer"}
+
+G = 9.80665
+"""Standard gravity, m/s2."""
 
 LEAST = dict.fromkeys((RX, RY, RZ), 2e-4) | dict.fromkeys((FX, FY), 0.02)
 """Rms of what the line lets expect, in means over a second, rad/s and m/s2, below which it tells nothing of
@@ -254,12 +268,18 @@ def _words(name: str) -> str:
         return f"{AXES[OF_CHANNEL[LATES.index(name)]].name}, late"
     if name in SLOW:
         return f"a low-pass in the {SENSORS[name]}"
+    if name in TURNS:
+        return f"a gyro that is turned against the accelerometer ({name.removeprefix('gyro_')})"
     return "another factor of the accelerometer" if name == ACCEL_GAIN else "stamps whose second is none"
 
 
 def of_all(name: str, single: Single) -> Finding:
     """The finding of a sensor, or of the time, that the fit has set free."""
     value, sd = single.told[name]
+    if name in TURNS:
+        return _apart(name, value, sd, single)
+    if name in THEN:
+        return _changes(name, value, sd, single)
     if name in (*RAMPS, *CUTS):
         return _unsteady(name, value, sd, single)
     if name == PACE:
@@ -302,6 +322,76 @@ def of_all(name: str, single: Single) -> Finding:
     )
 
 
+def _apart(name: str, value: float, sd: float, single: Single) -> Finding:
+    """The finding of a gyro whose axes are turned against the accelerometer's."""
+    angle, by = name.removeprefix("gyro_"), math.degrees(1.0)
+    value = math.remainder(value, 2.0 * math.pi)
+    return Finding(
+        f"{angle} of the gyro beside the accelerometer",
+        name,
+        value * by,
+        sd * by,
+        0.0,
+        "deg",
+        "all of the ride",
+        _told(name, single),
+        f"the gyro is turned by {value * by:+.1f} deg of {angle} against the accelerometer, by how the line "
+        "rolls and bends",
+        f"imu.gyro.{angle}_deg",
+        f"imu.gyro.{angle}_deg",
+        _or(name, single),
+    )
+
+
+def _changes(name: str, value: float, sd: float, single: Single) -> Finding:
+    """The finding of what changes within a ride."""
+    of, by, unit = THEN[name], 1.0, "1"
+    cut = f"cut the recording at time_s = {single.changed_s:.4g}"
+    if of in ("roll", "pitch", "yaw"):
+        by, unit, field = math.degrees(1.0), "deg", f"imu.{of}_deg"
+        quantity, why = (
+            f"change of the {of} of the mounting",
+            f"the device has {value * by:+.1f} deg more of {of}",
+        )
+        remedy = f"{cut} and give each part its own {of}_deg; fasten the device"
+    elif of == "offset":
+        unit, field, quantity = "s", "imu.time_s", "jump of the clock"
+        side = "samples of the IMU are missing" if value < 0.0 else "the IMU has samples too many"
+        why = f"way and IMU are {abs(value):.2f} s apart, by their stamps: {side}"
+        remedy = f"{cut}, or give what follows its own stamps: samples that are numbered in a row hide a gap"
+    elif of == "wheel":
+        field, quantity = "encoder.count", "change of the factor of the wheel"
+        factor = 1.0 + value / single.found.value("wheel")
+        why = f"the train goes {factor:.3g} times as far as before, for what the device of the way counts"
+        remedy = f"{cut} and give each part its own radius or pulses; mend the wiring of the counter"
+    else:
+        column = dict(zip((name for name in THEN if "bias" in name), OF_CHANNEL, strict=True))[name]
+        axis, field = AXES[column].name.removesuffix(" alone"), f"imu.{column}"
+        by, unit = (math.degrees(1.0), "deg/s") if column in GYRO else (1.0, "m/s2")
+        quantity, why = (
+            f"jump of the offset of {axis}",
+            f"the offset of {axis} is {value * by:+.3g} {unit} more",
+        )
+        remedy = f"{cut}; log raw samples, without an automatic zero"
+        if column in ACCEL:
+            tilt = abs(math.degrees(math.asin(min(1.0, abs(value) / G))))
+            why += f", as a tilt of {tilt:.2g} deg would make it"
+            remedy += "; fasten the device"
+    return Finding(
+        quantity,
+        name,
+        value * by,
+        sd * by,
+        0.0,
+        unit,
+        "all of the ride",
+        _told(name, single),
+        f"from time_s = {single.changed_s:.4g} on {why}",
+        field=field,
+        remedy=remedy,
+    )
+
+
 def _unsteady(name: str, value: float, sd: float, single: Single) -> Finding:
     """The finding of a sensor whose offset grows in the ride, or that takes off what is slow."""
     if name in RAMPS:
@@ -338,7 +428,9 @@ def _upright(recording: Recording, single: Single | None) -> Finding:
     found, off = Slope(up.value, up.sd), abs(up.value - 1.0) / up.sd
     verdict: Verdict = "surely wrong" if off > CERTAIN else "likely wrong" if off > LIKELY else "sound"
     name, why, remedy, setting = "accelerometer Z alone", "", "", ""
-    if verdict != "sound":
+    if verdict != "sound" and single is not None and single.changed_s is not None:
+        verdict, why = "could not be judged", "something changes within the ride"
+    elif verdict != "sound":
         why, setting = f"is {up.value:.3g} times gravity in the median of the ride", "imu.scale.accel"
         remedy = "mend the scale, if one axis alone has another one, its offset, or gravity_mps2"
         whole = _by_all(up, single)

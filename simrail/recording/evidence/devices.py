@@ -39,7 +39,9 @@ def weigh_all(recording: Recording) -> Evidence:
     is_single = first.single is not None and bool(first.single.free)
     if any(finding.verdict == "surely wrong" for finding in first.findings):
         slopes = weigh_axes(recording)
-        are_signs = are_columns(slopes)
+        # Where something changes within the ride, a slope over all of it says nothing.
+        is_changed = first.single is not None and first.single.changed_s is not None
+        are_signs = not is_changed and are_columns(slopes)
         if are_signs:
             first, axes = (
                 replace(first, findings=tuple(_unjudged(finding) for finding in first.findings)),

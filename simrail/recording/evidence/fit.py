@@ -36,6 +36,8 @@ from simrail.recording.evidence.model import (
     RAMPS,
     SINGLE,
     SLOW,
+    THEN,
+    TURNS,
     Motion,
     Ride,
     blocks_of,
@@ -59,9 +61,10 @@ OUTLIER = 3.0
 
 FREE = {"wheel": 10.0, "shift": 3e3, "offset": 30.0, "drift": 1e-3, "gyro_offset": 30.0, "gyro": 30.0}
 FREE |= dict.fromkeys((*GAINS, PACE, ACCEL_GAIN, *LATES, *SLOW, *RAMPS, *CUTS), 30.0)
+FREE |= dict.fromkeys((*TURNS, *THEN), 3.0)
 """Prior sds of faults: so wide that they say nothing."""
 
-HELD = ("gyro_offset", *SINGLE, *RAMPS, *CUTS)
+HELD = ("gyro_offset", *SINGLE, *RAMPS, *CUTS, *THEN)
 """Parameters that stay as they are where a fit does not set them free."""
 
 MOUNT_SD_RAD = 3.0
@@ -80,7 +83,9 @@ STOP_SD_RAD = 4e-3
 """Of roll and pitch where a train stands, beside the map's: 5 mm of level over two metres."""
 
 BEHIND_SD_M = 1.0
-"""How far from a body's reference point the place may be at which it turns, beside what is known of it."""
+"""How far from a body's reference point the place may be at which it turns, beside what is known of it. An
+axle turns with what holds it by its primary springs: a bogie, of half a wheelbase of 0.9 to 1.3 m, or a
+two-axle wagon, whose 3 m are three of these and are still explained better by a place than by a clock."""
 
 SLUGGISH_SD_S = 0.5
 """How late a body on springs may roll and pitch; it turns about Z with the track."""
@@ -187,7 +192,7 @@ def fit(
         noise = np.array([0.01, 0.01, 0.01, 0.1, 0.1]) * np.ones((2, 1))
     weights = np.ones_like(ride.measured)
     for round_ in range(rounds):
-        near = _near(ride, x, noise, weights, free)
+        near = linear(ride, x, noise, weights, free)
         here, seen, standing, count = near.solved_for, near.seen, near.standing, len(near.solved_for)
         normal, right = near.normal()
         solved = np.linalg.solve(normal, right)
@@ -211,7 +216,7 @@ def fit(
     return Fit(x, covariance, cost, explained, standing, noise, weights, left, strain)
 
 
-class _Near(NamedTuple):
+class Near(NamedTuple):
     """A ride near some parameters, as linear in what is solved for.
 
     Attributes
@@ -239,6 +244,10 @@ class _Near(NamedTuple):
     seen: np.ndarray
     standing: np.ndarray
 
+    def column(self, name: str) -> int:
+        """Column of a parameter that is solved for."""
+        return int(np.flatnonzero(self.solved_for == INDEX[name])[0])
+
     def only(self, columns: IntArray) -> Self:
         """The same with some of what is solved for, in that order."""
         return self._replace(
@@ -258,13 +267,14 @@ class _Near(NamedTuple):
         return weighted @ flat + np.diag(1.0 / self.sds**2), right
 
 
-def _near(ride: Ride, x: FloatArray, noise: FloatArray, weights: FloatArray, free: Sequence[str]) -> _Near:
+def linear(ride: Ride, x: FloatArray, noise: FloatArray, weights: FloatArray, free: Sequence[str]) -> Near:
+    """A ride as it is near some parameters, for a noise, weights and what is free as `fit` has them."""
     solved_for = np.array([i for i, name in enumerate(GLOBALS) if name not in HELD or name in free])
     seen, here, moved = inside(ride, x), readings(ride, x), motion(ride, x)
     standing = np.abs(blocks_of(np.abs(moved.speed_mps))) < STILL_MPS
     by_all = slopes(ride, x, here, solved_for)
     beside, beside_sd = _nuisance(ride, by_all, _places(ride, x, moved), standing, free=free)
-    return _Near(
+    return Near(
         solved_for,
         np.concatenate([by_all[:, :, solved_for], beside], axis=2),
         ride.measured - here.expected,
@@ -292,8 +302,8 @@ def hints(
     free : sequence of str
         Those that were free in the fit.
     """
-    near = _near(ride, found.x, found.noise, found.weights, (*free, *names))
-    columns = {name: int(np.flatnonzero(near.solved_for == INDEX[name])[0]) for name in names}
+    near = linear(ride, found.x, found.noise, found.weights, (*free, *names))
+    columns = {name: near.column(name) for name in names}
     others = np.setdiff1d(np.arange(len(near.sds)), list(columns.values()))
     told = {}
     for name, column in columns.items():
@@ -386,12 +396,13 @@ def _nuisance(
         column[:last] = 0.0
         columns.append(column)
         sds.append(max(way, 1.0))
+    # What holds a body turns as at its own middle, and the body rolls and pushes where it is: that is a
+    # place, and no time.
+    column = np.zeros((len(place), CHANNELS))
+    column[:, GYRO_Z] = slopes[:, GYRO_Z, INDEX["shift"]]
+    columns.append(column)
+    sds.append(np.hypot(recording.mount_position_m[0], BEHIND_SD_M))
     if "gyro_offset" in free:
-        # A body turns as at its middle, and pushes as at the device: that is a place, and no time.
-        column = slopes[:, :, INDEX["shift"]].copy()
-        column[:, FORCE_X:] = 0.0
-        columns.append(column)
-        sds.append(np.hypot(recording.mount_position_m[0], BEHIND_SD_M))
         for channel in (GYRO_X, GYRO_Y):
             column = np.zeros((len(place), CHANNELS))
             column[:, channel] = slopes[:, channel, INDEX["gyro_offset"]]

@@ -19,6 +19,7 @@ from simrail.core.jit import FloatArray
 from simrail.recording.evidence.finding import LIKELY, Finding, Verdict, verdict_of
 from simrail.recording.evidence.fit import Fit, fit, hints
 from simrail.recording.evidence.line import K3
+from simrail.recording.evidence.midway import change_of
 from simrail.recording.evidence.model import (
     CUTS,
     GAINS,
@@ -36,6 +37,7 @@ from simrail.recording.evidence.model import (
     without_drift,
 )
 from simrail.recording.evidence.search import (
+    KNOWN_S,
     LEAST_TURN_RAD,
     accel_is_apart,
     apart_fit,
@@ -53,6 +55,9 @@ from simrail.recording.recording import Recording
 
 FOLLOWED = 0.5
 """Share of the gyro's Z that it must explain at least, for the curves to say anything."""
+
+LEAST_MPS, LONGEST_S = 1.0, 10.0
+"""Speeds at which a place may be a time, and the longest lateness that is named for one."""
 
 HINT = 2.0
 """Standard deviations from which on another clock is named beside the one that is told."""
@@ -192,7 +197,7 @@ def weigh(recording: Recording) -> Evidence:
         if is_accel and key == "gyro_offset":
             finding = _of_the_accelerometer(finding)
         if best is one and key in ("gyro_offset", "offset", *ALIKE):
-            finding = _beside_a_late_gyro(finding, two, slack[key])
+            finding = _beside_a_late_gyro(finding, two, slack[key], ride)
         findings.append(finding)
     if ride.drift:
         findings = [_counted(finding, ride) if finding.key == "drift" else finding for finding in findings]
@@ -233,6 +238,18 @@ class _Fits(NamedTuple):
 
 
 def _explained(ride: Ride) -> tuple[Ride, _Fits]:
+    """A ride and its fits; with what changes within it, if something does."""
+    ride, fits = _unchanging(ride)
+    if ride.slides or ride.drift or PACE in fits.single.free:
+        return ride, fits
+    changed = change_of(ride, fits.best, fits.blamed(ride))
+    if changed is None:
+        return ride, fits
+    other, single = changed
+    return other, _Fits(single.found, single.found, single, single.found)
+
+
+def _unchanging(ride: Ride) -> tuple[Ride, _Fits]:
     """A ride and its fits; by other stamps, or without what its wheel says while it slides, if that is it."""
     one = best_fit(ride)
     two = apart_fit(ride, one)
@@ -390,7 +407,7 @@ def _follows_nothing(finding: Finding, best: Fit, told_turn: float, ride: Ride) 
     )
 
 
-def _beside_a_late_gyro(finding: Finding, two: Fit, slack: float) -> Finding:
+def _beside_a_late_gyro(finding: Finding, two: Fit, slack: float, ride: Ride) -> Finding:
     """A finding of the fit with one clock, beside what the fit with two leaves open."""
     key, kind = finding.key, KINDS[finding.key]
     value, sd = two.value(key), two.sd(key)
@@ -407,8 +424,14 @@ def _beside_a_late_gyro(finding: Finding, two: Fit, slack: float) -> Finding:
         if finding.wrong and is_known and abs(between) < 0.5 * abs(apart):
             other = f"{_late('accelerometer', -apart, 'gyro')}: set {OF_ACCEL}"
             finding = replace(finding, remedy=other)
-    elif finding.wrong and off < LIKELY:
+    elif finding.wrong and (off < LIKELY or (key == "shift" and two.sd("gyro_offset") > KNOWN_S)):
         seconds = two.value("gyro_offset")
+        if two.sd("gyro_offset") > KNOWN_S and key == "shift":
+            # At one speed a place is a time, and the fit has taken any.
+            speed = np.abs(ride.way.speed_mps)
+            seconds = finding.value / float(np.median(speed[speed > LEAST_MPS]))
+            if not abs(seconds) < LONGEST_S:
+                return finding
         other = f"{_late('gyro', seconds, 'accelerometer')} (this ride does not tell): set {OF_GYRO}"
         finding = replace(finding, remedy="; or ".join(part for part in (finding.remedy, other) if part))
     return finding

@@ -19,14 +19,17 @@ the turns of the time t + gyro_offset where the clock of the gyro is another tha
 
 Faults of one axis, one sensor or the time itself are parameters too, each of which stays at its sound value
 unless a fit sets it free: a gain of one channel, a channel that is late alone, a sensor behind a low-pass of
-the first order, a factor of the accelerometer, and a pace: stamps of which one unit is no second, so V and A
-are pace and pace^2 times what they are by the stamps, while the way stays.
+the first order, a factor of the accelerometer, angles of the gyro against the accelerometer, and a pace:
+stamps of which one unit is no second, so V and A are pace and pace^2 times what they are by the stamps, while
+the way stays. And a few may change at one moment of the ride: a device that came loose, a clock or an offset
+that jumps, a counter that counts otherwise.
 
 Not here: motion of the body in the track, which averages out or is noise, and the height of the mount.
 """
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -55,12 +58,21 @@ OF_CHANNEL = (*GYRO, *ACCEL[:2])
 GAINS, LATES = (tuple(f"{what}_{name}" for name in OF_CHANNEL) for what in ("gain", "late"))
 SLOW, PACE, ACCEL_GAIN = ("slow_gyro", "slow_accel"), "pace", "accel"
 
-SINGLE = (*GAINS, *LATES, *SLOW, PACE, ACCEL_GAIN)
+TURNS = ("gyro_roll", "gyro_pitch", "gyro_yaw")
+
+SINGLE = (*GAINS, *LATES, *SLOW, PACE, ACCEL_GAIN, *TURNS)
 """Parameters of a fault of one axis, one sensor or the time: each free only where it is asked for."""
 
 RAMPS, CUTS = tuple(f"ramp_{name}" for name in OF_CHANNEL), ("cut_gyro", "cut_accel")
 """Parameters of a sensor that is not steady: how far the offset of a channel grows in the ride; and the
 corner, in rad/s, of a high-pass of the first order."""
+
+THEN = {f"then_{name}": name for name in ("roll", "pitch", "yaw", "offset", "wheel")}
+THEN |= {
+    f"then_{name}": name
+    for name in ("gyro_bias_x", "gyro_bias_y", "gyro_bias_z", "accel_bias_x", "accel_bias_y")
+}
+"""Parameters of what changes within the ride: by how much another one is more from `Ride.then` on."""
 
 GLOBALS = (
     "wheel",
@@ -78,6 +90,7 @@ GLOBALS = (
     *SINGLE,
     *RAMPS,
     *CUTS,
+    *THEN,
     "gyro_bias_x",
     "gyro_bias_y",
     "gyro_bias_z",
@@ -118,6 +131,8 @@ class Ride:
         What has been taken off the clock of the device of the way against the IMU's, from its first stamp on.
     of_imu : bool
         Whether by the stamps of the IMU.
+    then : int, optional
+        Block from which on `THEN` holds; none if nothing changes.
     """
 
     recording: Recording
@@ -130,6 +145,7 @@ class Ride:
     slid: np.ndarray | None = None
     drift: float = 0.0
     of_imu: bool = False
+    then: int | None = None
 
     @cached_property
     def told(self) -> FloatArray:
@@ -206,8 +222,7 @@ def ride_of(recording: Recording) -> Ride | None:
     return Ride(recording, way, table, fine, np.diff(sums, axis=0) / block_s, block_s)
 
 
-@dataclass(frozen=True)
-class Motion:
+class Motion(NamedTuple):
     """Place, speed and acceleration (b * FINE,) of the train for a set of parameters, and whether known."""
 
     place_m: FloatArray
@@ -242,7 +257,31 @@ def motion_of(ride: Ride, x: FloatArray, told: FloatArray) -> Motion:
 
 def motion(ride: Ride, x: FloatArray, *, later_s: float = 0.0) -> Motion:
     """How the train moved some time after the stamps of the accelerometer, for parameters (len(GLOBALS),)."""
-    return motion_of(ride, x, when_of(ride, x, later_s=later_s))
+    moved = motion_of(ride, x, when_of(ride, x, later_s=later_s))
+    if ride.then is None:
+        return moved
+    x, first = after(ride, x), ride.then * FINE
+    then = motion_of(ride, x, when_of(ride, x, later_s=later_s))
+    return Motion(
+        *(np.concatenate([one[:first], other[first:]]) for one, other in zip(moved, then, strict=True))
+    )
+
+
+def after(ride: Ride, x: FloatArray) -> FloatArray:
+    """Parameters (len(GLOBALS),) as they are from `Ride.then` on; there the train is where it was."""
+    assert ride.then is not None
+    then = x.copy()
+    for name, of in THEN.items():
+        then[INDEX[of]] += x[INDEX[name]]
+        then[INDEX[name]] = 0.0
+    then[INDEX["shift"]] -= x[INDEX["then_wheel"]] * way_then(ride, x)
+    return then
+
+
+def way_then(ride: Ride, x: FloatArray) -> float:
+    """What the way says at `Ride.then`, m."""
+    assert ride.then is not None
+    return float(when_of(ride, x)[ride.then * FINE, 0])
 
 
 def laters(x: FloatArray) -> FloatArray:

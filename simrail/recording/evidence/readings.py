@@ -6,7 +6,7 @@ clocks follow from one another, and but three differences are taken: by the whee
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.signal import lfilter
@@ -28,9 +28,13 @@ from simrail.recording.evidence.model import (
     PACE,
     RAMPS,
     SLOW,
+    THEN,
+    TURNS,
     Ride,
+    after,
     laters,
     motion_of,
+    way_then,
     when_of,
 )
 
@@ -72,6 +76,8 @@ class Readings:
         Readings without gains of single channels, and without bias.
     expected : ndarray (b, 5)
         Readings.
+    then : Readings, optional
+        What it reads from `Ride.then` on, where something changes; ``expected`` holds that already.
     """
 
     by: Mapping[str, float]
@@ -79,6 +85,7 @@ class Readings:
     parts: list[tuple[np.ndarray, FloatArray]]
     plain: FloatArray
     expected: FloatArray
+    then: "Readings | None" = None
 
 
 def expected(ride: Ride, x: FloatArray) -> FloatArray:
@@ -98,15 +105,25 @@ def readings(ride: Ride, x: FloatArray, told: list[tuple[float, FloatArray]] | N
     told : list of (float, ndarray), optional
         What the way says, from parameters with the same clocks.
     """
+    here = _steady(ride, x, told)
+    if ride.then is None:
+        return here
+    then = _steady(ride, after(ride, x), told if x[INDEX["then_offset"]] == 0.0 else None)
+    joined = np.concatenate([here.expected[: ride.then], then.expected[ride.then :]])
+    return replace(here, expected=joined, then=then)
+
+
+def _steady(ride: Ride, x: FloatArray, told: list[tuple[float, FloatArray]] | None) -> Readings:
+    """What a device reads if nothing changes within the ride."""
     by, later = dict(zip(GLOBALS, x.tolist(), strict=True)), laters(x)
     if told is None:
         told = [(seconds, when_of(ride, x, later_s=seconds)) for seconds in sorted(set(later.tolist()))]
-    turn = _turns(by)[0]
+    turn, turn_gyro = _turns(by)[0], _turns_gyro(by)[0]
     plain, parts = np.empty((len(ride.measured), CHANNELS)), []
     for seconds, said in told:
         channels = later == seconds
         part = _parts(ride, x, by, said)
-        plain[:, channels] = _device(_body(part, by), turn, by)[:, channels]
+        plain[:, channels] = _device(_body(part, by), turn, turn_gyro, by)[:, channels]
         parts.append((channels, part))
     gains = x[[INDEX[name] for name in GAINS]]
     grown = x[[INDEX[name] for name in RAMPS]] * _share(ride)[:, None]
@@ -127,8 +144,22 @@ def slopes(ride: Ride, x: FloatArray, here: Readings, solved_for: IntArray) -> F
     solved_for : ndarray (m,)
         Which of them.
     """
+    found = _slopes(ride, x, here, {GLOBALS[i] for i in solved_for})
+    if ride.then is None or here.then is None:
+        return found
+    first, wanted = ride.then, {GLOBALS[i] for i in solved_for}
+    found[first:] = _slopes(ride, after(ride, x), here.then, wanted)[first:]
+    for name, of in THEN.items():
+        found[first:, :, INDEX[name]] = found[first:, :, INDEX[of]]
+    found[first:, :, INDEX["then_wheel"]] -= way_then(ride, x) * found[first:, :, INDEX["shift"]]
+    return found
+
+
+def _slopes(ride: Ride, x: FloatArray, here: Readings, wanted: set[str]) -> FloatArray:
+    """Slopes (b, 5, len(GLOBALS)) if nothing changes within the ride."""
+    steady = _steady(ride, x, here.told).expected if ride.then is not None else here.expected
     found = np.zeros((*here.plain.shape, len(GLOBALS)))
-    by, wanted = here.by, {GLOBALS[i] for i in solved_for}
+    by = here.by
     gains = x[[INDEX[name] for name in GAINS]]
     for channels, part in here.parts:
         for name, values in _linear(part, by, wanted):
@@ -138,7 +169,7 @@ def slopes(ride: Ride, x: FloatArray, here: Readings, solved_for: IntArray) -> F
             other = x.copy()
             other[INDEX[name]] += step
             told = None if name == "offset" else here.told
-            found[:, :, INDEX[name]] = (readings(ride, other, told).expected - here.expected) / step
+            found[:, :, INDEX[name]] = (_steady(ride, other, told).expected - steady) / step
     # What a clock of one sensor does, another's does the other way; and a drift is an offset that grows.
     earlier, middles = found[:, :, INDEX["offset"]], ride.fine_s[FINE // 2 :: FINE] - ride.middle_s
     found[:, :, INDEX["drift"]] = earlier * middles[:, None]
@@ -207,26 +238,39 @@ def _turns(by: Mapping[str, float]) -> FloatArray:
     return found
 
 
-def _device(body: FloatArray, turn: FloatArray, by: Mapping[str, float]) -> FloatArray:
+def _turns_gyro(by: Mapping[str, float]) -> FloatArray:
+    """The same of the gyro, whose angles may be others than the accelerometer's."""
+    return _turns({angle: by[angle] + by[own] for angle, own in zip(_ANGLES, TURNS, strict=True)})
+
+
+def _device(body: FloatArray, turn: FloatArray, turn_gyro: FloatArray, by: Mapping[str, float]) -> FloatArray:
     """Readings (b, 5) of what a body does (b, 6), in the axes of a device."""
     read = np.empty((len(body), CHANNELS))
-    read[:, :FORCE_X] = by["gyro"] * (body[:, :3] @ turn)
+    read[:, :FORCE_X] = by["gyro"] * (body[:, :3] @ turn_gyro)
     read[:, FORCE_X:] = by[ACCEL_GAIN] * (body[:, _FORCE] @ turn[:, :2])
     return read
 
 
 def _linear(part: FloatArray, by: Mapping[str, float], wanted: set[str]) -> list[tuple[str, FloatArray]]:
     """Slopes (b, 5) by what the means over blocks are linear in, without gains of single channels."""
-    body, (turn, *turned) = _body(part, by), _turns(by)
-    found = [(name, _device(body, other, by)) for name, other in zip(_ANGLES, turned, strict=True)]
+    body, (turn, *turned), (turn_gyro, *turned_gyro) = _body(part, by), _turns(by), _turns_gyro(by)
+    found = [
+        (name, _device(body, other, other_gyro, by))
+        for name, other, other_gyro in zip(_ANGLES, turned, turned_gyro, strict=True)
+    ]
+    for name, other in zip(TURNS, turned_gyro, strict=True):
+        if name in wanted:
+            one = np.zeros((len(body), CHANNELS))
+            one[:, :FORCE_X] = _device(body, turn, other, by)[:, :FORCE_X]
+            found.append((name, one))
     for name, added in _SPRINGS.items():
         more = np.zeros_like(body)
         for to, of in added:
             more[:, to] = part[:, of]
-        found.append((name, _device(more, turn, by)))
+        found.append((name, _device(more, turn, turn_gyro, by)))
     for name, which in (("gyro", slice(0, FORCE_X)), (ACCEL_GAIN, slice(FORCE_X, CHANNELS))):
         if name in wanted:
             one = np.zeros((len(body), CHANNELS))
-            one[:, which] = _device(body, turn, {"gyro": 1.0, ACCEL_GAIN: 1.0})[:, which]
+            one[:, which] = _device(body, turn, turn_gyro, {"gyro": 1.0, ACCEL_GAIN: 1.0})[:, which]
             found.append((name, one))
     return found

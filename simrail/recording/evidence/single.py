@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from simrail.core.columns import ACCEL
+from simrail.core.columns import ACCEL, GYRO
 from simrail.core.jit import FloatArray
 from simrail.recording.evidence.finding import LIKELY, SURE
 from simrail.recording.evidence.fit import OUTLIER, Fit, fit, hints
@@ -23,9 +23,11 @@ from simrail.recording.evidence.model import (
     GAINS,
     INDEX,
     LATES,
+    OF_CHANNEL,
     PACE,
     SINGLE,
     SLOW,
+    TURNS,
     Ride,
     start_values,
 )
@@ -60,6 +62,9 @@ LEAST_UP = 0.01
 FIRST_S = 0.3
 """Time constant from which a low-pass is looked for: at none, the model has no slope by it."""
 
+SHOWN_BY = (GYRO[1], GYRO[0], GYRO[1])
+"""Which axis shows most of a gyro that is rolled, pitched or yawed: one that turns little by itself."""
+
 FEW, TRIAL, FOLLOWED = 3, 5, 3
 """Rounds of a first look, and of a fit that is compared with others; and how many looks are followed."""
 
@@ -83,6 +88,8 @@ class Single:
         How far each may be off in a sound ride, besides.
     rivals : tuple of str
         What explains the ride nearly as well as the last of those that are free.
+    changed_s : float, optional
+        Time stamp of the IMU from which on they hold, where they begin within the ride.
     """
 
     found: Fit
@@ -90,6 +97,7 @@ class Single:
     told: dict[str, tuple[float, float]]
     slack: dict[str, float]
     rivals: tuple[str, ...] = ()
+    changed_s: float | None = None
 
     def off(self, name: str) -> float:
         """How many standard deviations one of those that were looked at is off."""
@@ -252,9 +260,9 @@ def _best(fits: dict[str, Fit], against: Sequence[Fit], slack: dict[str, float])
 def _follows(name: str, found: Fit, off: float) -> bool:
     """Whether an axis that is so far off follows the line at all: bodies on springs roll by themselves."""
     least = LEAST_SURE_SHARE if off > SURE else LEAST_SHARE
-    for names in (GAINS, LATES):
+    for names, channels in ((GAINS, OF_CHANNEL), (LATES, OF_CHANNEL), (TURNS, SHOWN_BY)):
         if name in names:
-            return bool(found.explained[names.index(name)] > least)
+            return bool(found.explained[OF_CHANNEL.index(channels[names.index(name)])] > least)
     return True
 
 

@@ -16,6 +16,8 @@ from simrail.recording.evidence.model import (
     PACE,
     RAMPS,
     SLOW,
+    THEN,
+    TURNS,
     Ride,
     motion,
     start_values,
@@ -34,6 +36,16 @@ AHEAD_SHARE = 0.5
 RAMP_SD_RADPS, RAMP_SD_MPS2, CUT_SD_RADPS = 2e-3, 0.05, 0.01
 """Of an offset, over a ride, beside what its sheet calls instability: warming up; and of the corner of a
 high-pass: one of 100 s."""
+
+TURN_SD_RAD = math.radians(0.5)
+"""Of the gyro against the accelerometer, beside the package: what cant that is wrong, and a body that leans
+and squats, leave of a roll or a pitch."""
+
+THEN_SD = {"then_wheel": 0.01, "then_offset": 0.0}
+THEN_SD |= dict.fromkeys(("then_roll", "then_pitch", "then_yaw"), TURN_SD_RAD)
+THEN_GYRO_SD_RADPS, THEN_ACCEL_SD_MPS2 = 3e-4, 0.02
+"""Of what changes within a ride: nothing does, but for what rails that are wrong, and bodies that stick, make
+of it."""
 
 PACE_SD = 0.003
 """Of stamps, beside their clock: as little as the factor of a gyro, which a pace is much like."""
@@ -80,6 +92,7 @@ def slack_of(ride: Ride, found: Fit) -> dict[str, float]:
         scale = sheet.gyro_scale_error if channel <= GYRO_Z else sheet.accel_scale_error
         slack[gain] = math.hypot(scale / math.sqrt(3.0), GAIN_SD)
         slack[late] = clock_slack(ride)
+    slack |= dict.fromkeys(TURNS, math.hypot(package, TURN_SD_RAD))
     slack[ACCEL_GAIN] = math.hypot(sheet.accel_scale_error / math.sqrt(3.0), GAIN_SD)
     slack[PACE] = math.hypot(PACE_SD, bent)
     for channel, ramp in enumerate(RAMPS):
@@ -89,7 +102,12 @@ def slack_of(ride: Ride, found: Fit) -> dict[str, float]:
             if is_gyro
             else math.hypot(RAMP_SD_MPS2, 3.0 * sheet.accel_bias_instability_mps2)
         )
-    slack |= dict.fromkeys(CUTS, CUT_SD_RADPS)
+    slack |= dict.fromkeys(CUTS, CUT_SD_RADPS) | THEN_SD | {"then_offset": clock_slack(ride)}
+    for name, of in THEN.items():
+        if of.startswith("gyro_bias"):
+            slack[name] = math.hypot(THEN_GYRO_SD_RADPS, 3.0 * sheet.gyro_bias_instability_radps)
+        elif of.startswith("accel_bias"):
+            slack[name] = math.hypot(THEN_ACCEL_SD_MPS2, 3.0 * sheet.accel_bias_instability_mps2)
     return slack | dict.fromkeys(SLOW, clock_slack(ride))
 
 

@@ -92,6 +92,9 @@ def mended(data: dict[str, Any], evidence: Evidence) -> list[str]:
         found = {key: wrong[f"{mark}{key}"].value for key in ANGLES if f"{mark}{key}" in wrong}
         if found:
             _turn(data, table, found, changes)
+        beside = {key: wrong[f"{mark}gyro_{key}"].value for key in ANGLES if f"{mark}gyro_{key}" in wrong}
+        if beside:
+            _turn(data, f"{table}.gyro", beside, changes)
     if "wheel" in wrong:
         _mend_wheel(data, wrong["wheel"], changes)
     if "shift" in wrong:
@@ -152,13 +155,16 @@ def _mend_wheel(data: dict[str, Any], wheel: Finding, changes: list[str]) -> Non
 
 
 def _turn(data: dict[str, Any], table: str, wrong: Mapping[str, float], changes: list[str]) -> None:
-    """Mounting angles: those that are given, turned on by those that were found, degrees."""
-    imu = data[table]
-    given = np.radians([[float(imu.get(f"{key}_deg", 0.0)) for key in ANGLES]])
+    """Mounting angles: those that are given, turned on by those that were found, degrees.
+
+    A sensor of an IMU has those of the IMU, where it has none of its own.
+    """
+    imu, _, sensor = table.partition(".")
+    own = data[imu].setdefault(sensor, {}) if sensor else data[imu]
+    given = [float(own.get(f"{key}_deg", data[imu].get(f"{key}_deg", 0.0))) for key in ANGLES]
     found = np.radians([[wrong.get(key, 0.0) for key in ANGLES]])
-    angles = np.degrees(euler_angles(rotation_matrix(found) @ rotation_matrix(given)))[0]
-    for key, angle in zip(ANGLES, angles, strict=True):
-        before = float(imu.get(f"{key}_deg", 0.0))
+    angles = np.degrees(euler_angles(rotation_matrix(found) @ rotation_matrix(np.radians([given]))))[0]
+    for key, angle, before in zip(ANGLES, angles, given, strict=True):
         if abs(angle - before) > 1e-6:
             _set(data, f"{table}.{key}_deg", float(f"{angle:.5g}"), before, changes)
 

@@ -25,6 +25,13 @@ from simrail.vehicle.contact.profile_cleaning import (
     miniprof_tape_circle,
     roughness_note,
 )
+from simrail.vehicle.contact.profile_doubts import (
+    centre_note,
+    hole_note,
+    refuse_upside_down,
+    spike_note,
+    tip_note,
+)
 from simrail.vehicle.contact.profile_points import MINIPROF, TEXTS, read_points, thinned
 from simrail.vehicle.contact.profiles import (
     RailProfile,
@@ -128,8 +135,9 @@ def _wheel_of(path: Path, tape_circle_m: float | None) -> WheelProfile:
     if tape_circle_m is None and read.miniprof is not None:
         tape_circle_m = miniprof_tape_circle(read.y, read.z, read.miniprof)
         notes.append(f"the tape circle is taken at {1e3 * tape_circle_m:g} mm of the file")
-    y, z, _ = clean_wheel((read.y, read.z, read.line), tape_circle_m=tape_circle_m, notes=notes)
-    y, z = thinned(y, z)
+    points = clean_wheel((read.y, read.z, read.line), tape_circle_m=tape_circle_m, notes=notes)
+    spike = spike_note(points)
+    y, z = thinned(points[0], points[1])
     spline = CubicSpline(y, z)
     if spline(y[0]) - spline(0.0) < 0.1 * (y[-1] - y[0]):
         raise InputError(
@@ -149,7 +157,8 @@ def _wheel_of(path: Path, tape_circle_m: float | None) -> WheelProfile:
             limit=f"{1e3 * _FALSE_FLANGE * flange:.1f} mm, {100 * _FALSE_FLANGE:g} % of the flange",
             remedy="name the file as rail_profile, or end the points at the rim",
         )
-    notes += [note for note in [roughness_note(y, z, around_m=0.0)] if note]
+    told = (spike, roughness_note(y, z, around_m=0.0), hole_note(y, around_m=0.0), tip_note(y))
+    notes += [note for note in told if note]
     return WheelProfile(path.name, y, z - float(spline(0.0)), f"file {path.name}", tuple(notes))
 
 
@@ -186,8 +195,10 @@ def _rail_of(path: Path) -> RailProfile:
     """The rail profile of a file."""
     read = read_points(path, kind=0)
     notes = list(read.notes)
-    y, z, _ = clean_rail((read.y, read.z, read.line), notes=notes)
-    y, z = thinned(y, z)
+    refuse_upside_down(read.y, read.z)
+    points = clean_rail((read.y, read.z, read.line), notes=notes)
+    spike = spike_note(points)
+    y, z = thinned(points[0], points[1])
     top = int(np.argmin(z))
     if min(z[0], z[-1]) - z[top] < 0.01 * (y[-1] - y[0]):
         raise InputError(
@@ -198,7 +209,9 @@ def _rail_of(path: Path) -> RailProfile:
             remedy="depth is positive downward: set mirror.z, or turn the sign of the second column; a "
             "wheel's profile has no such head",
         )
-    notes += [note for note in [roughness_note(y, z, around_m=float(y[top]))] if note]
+    around = float(y[top])
+    told = (spike, roughness_note(y, z, around_m=around), hole_note(y, around_m=around), centre_note(y))
+    notes += [note for note in told if note]
     return RailProfile(path.name, y, z - z[top], f"file {path.name}", tuple(notes))
 
 
