@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
-from simrail.estimators.odometry.pointing import OTHER_BODY, chord_of, pointing_of
+from simrail.estimators.odometry.pointing import OTHER_BODY, chord_of, pointing_of, section_of
 
 from simrail.core.errors import InputError, did_you_mean
 from simrail.recording.recording import Recording
@@ -162,13 +162,23 @@ JOINTED = replace(
     torsion_sd=0.5,
     y_tilt_sd=1.0,
 )
-"""A body on one bogie, or between other bodies: joints make its neighbours turn, pitch and shift it, and it
-swings on after a transition. Of a section of three modules that is 1.2 times as heavy as `metro_irw_train`,
-1.6 times as stiff in its springs and half as damped in its joints: pitch and place by likelihood, yaw a
-third larger than that so that a swing passes for no fault, the torsion by regression on its truth (0.65 to
-0.68 of how much more the track rolls under its neighbour)."""
+"""A body of a section, on one bogie or between other bodies: joints make its neighbours turn, pitch and
+shift it, and it swings on after a transition. Of a section of three modules that is 1.2 times as heavy as
+`metro_irw_train`, 1.6 times as stiff in its springs and half as damped in its joints: pitch and place by
+likelihood, yaw a third larger than that so that a swing passes for no fault, the torsion by regression on
+its truth (0.65 to 0.68 of how much more the track rolls under its neighbour)."""
 
-CLASSES = {"axle": AXLE, "frame": FRAME, "body": BODY, "wagon": WAGON, "jointed": JOINTED}
+LONE = replace(JOINTED, pitch_sd=8e-4, yaw_sd=3e-3, yaw_length=21.0)
+"""A body on one bogie that hangs on no other: nothing but its own springs hold its pitch."""
+
+CLASSES = {
+    "axle": AXLE,
+    "frame": FRAME,
+    "body": BODY,
+    "wagon": WAGON,
+    "jointed": JOINTED,
+    "lone": LONE,
+}
 """Classes of mounts, by the word that a tuned size begins with, e.g. ``axle_yaw_sd``."""
 
 STANDARD_BASE_M = 1.5
@@ -275,7 +285,7 @@ def class_of(recording: Recording) -> Motion:
     if not here.supports:
         return AXLE
     if pointing_of(recording, chord_of(recording)) is OTHER_BODY:
-        return JOINTED
+        return LONE if section_of(recording) is None else JOINTED
     below = [sheet.body(support.on) for support in here.supports]
     on_axles = all(body is None or not body.supports for body in below)
     if on_axles:

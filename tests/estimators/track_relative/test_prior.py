@@ -17,6 +17,7 @@ from simrail.estimators.track_relative.noise import (
     BODY,
     FRAME,
     JOINTED,
+    LONE,
     MODEL_BODY,
     MOST_DAMPING,
     SLOW_M,
@@ -52,7 +53,7 @@ def test_the_class_of_a_mount_is_that_of_the_drawing(rough: Callable) -> None:
 
 
 def test_a_body_on_one_bogie_or_between_others_is_jointed(rough: Callable) -> None:
-    """One on two bogies is not, nor one on axles."""
+    """One on two bogies is not, nor one on axles, nor one that hangs on no other."""
     train = VehicleSheet(
         (
             *(SheetBody(f"axle {i}", x) for i, x in enumerate((6.0, 4.0, -14.0, -16.0))),
@@ -67,6 +68,8 @@ def test_a_body_on_one_bogie_or_between_others_is_jointed(rough: Callable) -> No
     classes = {"end": JOINTED, "between": JOINTED, "coach": BODY, "bogie": FRAME, "axle 0": AXLE}
     for body, motion in classes.items():
         assert motion_of(replace(rough(), vehicle_sheet=train, mount_body=body)) is motion, body
+    alone = VehicleSheet(train.bodies[:7])
+    assert motion_of(replace(rough(), vehicle_sheet=alone, mount_body="end")) is LONE
 
 
 def test_cant_along_the_line_is_correlated_as_the_sheet_says(rough: Callable) -> None:
