@@ -126,3 +126,16 @@ def test_two_places_of_a_reference_err_apart_where_twist_is_between_them():
     sds = {(s.quantity, s.band): s.sd for s, _ in rail_errors(sure, reference, twist_base_m=3.0)}
     assert np.nanmax(sds["cross_level", "D1"]) == pytest.approx(0.5, rel=1e-12)
     assert np.nanmax(sds["twist", "full"]) == pytest.approx(0.5 * np.sqrt(2.0), rel=1e-12)
+
+
+def test_what_the_estimate_does_not_have_hides_nothing_behind_it() -> None:
+    """A column that is unknown to it, and one of blanks, before one that is compared."""
+    yaw = np.linspace(0.0, 0.3, len(TIME))
+    motion = pd.DataFrame(
+        {"pitch_rad": 0.0, "roll_rad": np.nan, "yaw_rad": yaw[::10] - np.linspace(0.0, 0.2, len(TIME[::10]))},
+        index=TIME[::10],
+    )
+    series = {s.quantity: s.error for s, _ in motion_errors(estimate(yaw_rad=yaw), RideReference(motion))}
+    assert set(series) == {"yaw", "yaw_debiased"}
+    assert series["yaw_debiased"][0] == 0.0
+    assert series["yaw_debiased"][-1] == pytest.approx(np.rad2deg(0.2), rel=1e-3)

@@ -103,3 +103,8 @@ def test_a_look_at_just_as_many_devices_as_can_be_enough_has_its_part_of_the_cha
     assert decide(59, 59, 0.95, chance=0.05, looks=(58, 59)) == ENOUGH
     assert decide(59, 59, 0.95, chance=0.05, looks=(59, 118)) == UNDECIDED
     assert decide(72, 72, 0.95, chance=0.05, looks=(59, 118)) == ENOUGH
+
+
+def test_devices_that_are_all_alike_count_as_their_tracks() -> None:
+    """Nothing says then that a device differs from its neighbour on the same rails."""
+    assert effective([0.2] * 12, [0, 1, 2] * 4) == pytest.approx(3.0)

@@ -123,3 +123,10 @@ def test_a_device_that_fails_is_in_no_pair() -> None:
     broken[0] = np.nan
     (row,) = imu_pairs(*campaign({"a": broken, "b": np.full((4, 1), 0.04)}), [WANTED]).to_dict("records")
     assert (row["won"], row["pairs"]) == (0, 3)
+
+
+def test_a_verdict_says_first_of_which_requirement_it_is() -> None:
+    scores, cells = campaign({"a": np.full((3, 1), 0.05)})
+    table = verdict_table(scores, cells, [WANTED, Requirement("roll", 0.01)])
+    assert list(table.columns[:2]) == ["requirement", "number"]
+    assert table["number"].tolist() == [0, 1]
