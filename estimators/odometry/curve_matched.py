@@ -193,6 +193,11 @@ class CurveMatchedOdometry:
         """What a reader calls it."""
         return "curve-smoothed odometry" if self.smoothed else "curve-matched odometry"
 
+    def at_scale(self, scale: float) -> "CurveMatchedOdometry":
+        """That of a model of another scale: its lengths are shorter by that."""
+        lengths = ("start_sd_m", "tread_length_m", "wheel_walk_m")
+        return replace(self, **{name: scale * getattr(self, name) for name in lengths})
+
     def __post_init__(self) -> None:
         for name in self.__dataclass_fields__:
             value = getattr(self, name)

@@ -41,6 +41,11 @@ class Pointing(NamedTuple):
     lead_sd_m: float
     attacks: bool = False
 
+    def at_scale(self, scale: float) -> "Pointing":
+        """That of a model of another scale, with the same angles."""
+        lengths = ("lag_sd_m", "lag_walk_m", "sway_length_m", "lead_sd_m")
+        return self._replace(**{name: scale * getattr(self, name) for name in lengths})
+
 
 AXLE = Pointing(0.1, 6e-4, 2e-5, 4e-4, 2.0, 1.0, attacks=True)
 """It steers against its frame."""

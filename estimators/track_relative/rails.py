@@ -23,6 +23,7 @@ import numpy as np
 import pandas as pd
 from scipy import ndimage, signal
 from scipy.interpolate import CubicSpline
+from simrail.estimators.odometry.scale import scale_of
 from simrail.estimators.track_relative.full_rate import (
     Chain,
     Held,
@@ -38,7 +39,7 @@ from simrail.estimators.track_relative.full_rate import (
 )
 from simrail.estimators.track_relative.kernel import OUTPUTS
 from simrail.estimators.track_relative.line import Lines
-from simrail.estimators.track_relative.noise import AXLE, FRAME, class_of, scale_of
+from simrail.estimators.track_relative.noise import AXLE, FRAME, class_of
 from simrail.estimators.track_relative.output import Trace
 from simrail.estimators.track_relative.states import ROLL, ROLL_SLOW
 from simrail.estimators.track_relative.suspension import bogie_of
