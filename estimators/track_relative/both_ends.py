@@ -9,8 +9,9 @@ so that, with no word of p, of the rails or of the suspension,
 
     z(s + a) - z(s - a) = a [slope(s + a) + slope(s - a)]
 
-An angle by a gyro errs by far less than a height by an accelerometer in waves that are longer than the body
-(an integral once against twice): what of that is not so is the height's error, in each wave by Wiener's filter
+In waves that are longer than the body an angle by a gyro errs by far less than a height by an accelerometer
+(an integral once against twice): what of that is not so is the height's error, in each wave by Wiener's
+filter
 
     error = P conj(T) / (|T|^2 P + Q) difference,     T = 2 i sin(2 pi a / wavelength)
 
