@@ -18,6 +18,7 @@ from scipy import signal
 from simrail.estimators.attitude.rest_bias import rest_bias
 from simrail.estimators.baselines import ZeroTrack
 from simrail.estimators.track_relative import rails as rails_of_body
+from simrail.estimators.track_relative.model import steps_of
 from simrail.estimators.track_relative.smoother import TrackRelativeSmoother
 from simrail.estimators.trajectory.smoother import TrajectorySmoother
 from simrail.estimators.tuning.file import Tuning
@@ -160,6 +161,15 @@ def test_the_rails_of_a_models_body_are_near_and_their_intervals_hold(
     monkeypatch.setattr(rails_of_body, "ends_of", lambda *_: None)
     alone = [replace(IN_FULL, draws=0).estimate(recording) for recording in recordings]
     assert (pooled("sd", alone)[[0, 2]] > 1.6 * error[[0, 2]]).all()
+
+
+def test_a_rolling_wheel_of_a_model_does_not_slip(ride: tuple[Rides, LaidTrack]) -> None:
+    """A body that sways as by its scale alone was .4 m off its own wheel, which knows to centimetres."""
+    for recording in ride[0](grade("lord_3dm_gx4_25")):
+        steps = steps_of(recording, 31.25)
+        assert recording.odometry is not None and not steps.slipping.any()
+        wheel = np.interp(steps.time_s, recording.odometry.index, recording.odometry["position_m"])
+        assert np.abs(steps.odometry[:, 0] - wheel).max() < 0.12
 
 
 @pytest.mark.slow
