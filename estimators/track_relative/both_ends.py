@@ -137,7 +137,8 @@ def _difference(ends: Ends, middle: FloatArray, slopes: FloatArray, step_m: floa
     rest[inside] = line(behind) - line(before) - half * (turn(behind) + turn(before))
     # A start that is not smooth would pass for waves.
     away = np.minimum(places - half, places[-1] - half - places) / (2.0 * half)
-    return rest * np.square(np.sin(0.5 * math.pi * np.clip(away, 0.0, 1.0)))[:, None]
+    smooth = np.square(np.sin(0.5 * math.pi * np.clip(away, 0.0, 1.0)))
+    return np.asarray(rest * smooth[:, None])
 
 
 def _padded(count: int, ends: Ends, step_m: float) -> int:
