@@ -100,6 +100,7 @@ from simrail.estimators.odometry.pointing import (
     sway_sd_of,
     turn_of,
 )
+from simrail.estimators.odometry.scale import scale_of
 from simrail.estimators.odometry.without_wheel import steps_without_wheel
 
 from simrail.core.columns import ACCEL, GYRO, ODOMETRY, ODOMETRY_SD
@@ -122,6 +123,10 @@ WHEELSET_SHARE = 0.4
 """Of the wandering of a free wheel's rolling radius, so much is that of a wheelset in a bogie: what one of
 its wheels gains by a shift to the side the other loses, and its taper steers it back. Under a long wagon it
 runs on its flange in curves, as a free wheel does."""
+
+MODEL_FORCE = 100.0
+"""By so much more than `force_m2ps3` the body of a model shakes, by its pitch: with less a wheel that rolls
+passes for one that slips. Synthetic, of the 1:10 car of `scale_greatest`."""
 
 STILL_SD_MPS = 1e-3
 """Of the speed of a train that is known to stand."""
@@ -192,6 +197,16 @@ class CurveMatchedOdometry:
     def label(self) -> str:
         """What a reader calls it."""
         return "curve-smoothed odometry" if self.smoothed else "curve-matched odometry"
+
+    def at_scale(self, scale: float) -> "CurveMatchedOdometry":
+        """That of a model of another scale: its lengths are shorter by that, and it shakes by `MODEL_FORCE`.
+
+        But for the walk of the wheel: over rails that are rougher than by the scale, its radius wanders more.
+        """
+        if scale == 1.0:
+            return self
+        lengths = {name: scale * getattr(self, name) for name in ("start_sd_m", "tread_length_m")}
+        return replace(self, force_m2ps3=MODEL_FORCE * self.force_m2ps3, **lengths)
 
     def __post_init__(self) -> None:
         for name in self.__dataclass_fields__:
@@ -274,7 +289,7 @@ class CurveMatchedOdometry:
             mount_x_m=recording.mount_position_m[0],
             wheel_ahead_m=wheel_ahead(recording),
         )
-        pointing = pointing_of(recording, chord)
+        pointing = pointing_of(recording, chord).at_scale(scale_of(recording))
         x, p = self._start(recording, pulse, chord, pointing, start)
         x[YAW] = line_at(grid, table, x[S]).heading
         spoken_of = STATES if self.smoothed else V + 1
@@ -295,7 +310,7 @@ class CurveMatchedOdometry:
     def _without_wheel(self, recording: Recording) -> Steps:
         """The steps of the filter that has the zero-velocity odometry in place of a wheel."""
         chord = chord_of(recording)
-        pointing = pointing_of(recording, chord)
+        pointing = pointing_of(recording, chord).at_scale(scale_of(recording))
         x, p = self._start(recording, 0.0, chord, pointing)
         return steps_without_wheel(
             recording, x, p, self._model(recording, 0.0, pointing), smoothed=self.smoothed

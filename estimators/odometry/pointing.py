@@ -12,6 +12,10 @@ from simrail.core.jit import FloatArray
 from simrail.recording.recording import Recording
 from simrail.recording.sheets.vehicle_sheet import Chord
 
+MODEL_SWAY = 8.0
+"""By so much more than a body of full size that of a model sways: its rails are rougher than by its scale.
+Synthetic, of the 1:10 car of `scale_greatest`."""
+
 
 class Pointing(NamedTuple):
     """How a body points against the chord of the track that it is on.
@@ -40,6 +44,14 @@ class Pointing(NamedTuple):
     sway_length_m: float
     lead_sd_m: float
     attacks: bool = False
+
+    def at_scale(self, scale: float) -> "Pointing":
+        """That of a model of another scale, with the same angles, but for the sway (`MODEL_SWAY`)."""
+        if scale == 1.0:
+            return self
+        lengths = ("lag_sd_m", "lag_walk_m", "sway_length_m", "lead_sd_m")
+        shorter = {name: scale * getattr(self, name) for name in lengths}
+        return self._replace(sway_sd_rad=MODEL_SWAY * self.sway_sd_rad, **shorter)
 
 
 AXLE = Pointing(0.1, 6e-4, 2e-5, 4e-4, 2.0, 1.0, attacks=True)

@@ -143,7 +143,7 @@ def held_of(recording: Recording, trace: Trace) -> Held:
         speed**2 * bent / g + track_roll,
         track_roll,
     ]
-    table = _at_samples(recording, trace, np.column_stack(slow))
+    table = at_samples(recording, trace, np.column_stack(slow))
     rest = recording.imu[list(SENSED)].to_numpy(dtype=np.float64) - table[:, :4]
     columns = [np.ascontiguousarray(column) for column in table[:, 4:].T]
     del table
@@ -154,7 +154,7 @@ def found_before(recording: Recording, trace: Trace) -> FloatArray:
     """ROLL less what is slow of it, Y and Z of the smoother at the samples, (n, 3)."""
     found = trace.states[:, [at.ROLL, at.Y, at.Z]]
     found[:, 0] -= trace.states[:, at.ROLL_SLOW]
-    return _at_samples(recording, trace, found)
+    return at_samples(recording, trace, found)
 
 
 def beside_rails(recording: Recording, trace: Trace) -> FloatArray:
@@ -166,10 +166,10 @@ def beside_rails(recording: Recording, trace: Trace) -> FloatArray:
     course, x = trace.course, [Dual(column) for column in trace.states.T]
     ground = ground_at(recording, course.lines, trace.states[:, at.S])
     pose = pose_of(x, ground, course.around, deviation_of(x, ground, course.around))
-    return _at_samples(recording, trace, (pose.rho[0] - pose.level).value)
+    return at_samples(recording, trace, (pose.rho[0] - pose.level).value)
 
 
-def _at_samples(recording: Recording, trace: Trace, values: FloatArray) -> FloatArray:
+def at_samples(recording: Recording, trace: Trace, values: FloatArray) -> FloatArray:
     """Values at the smoother's steps, at the IMU's samples; beyond the ends as there."""
     known = trace.course.steps.time_s
     time = recording.imu.index.to_numpy(dtype=np.float64)

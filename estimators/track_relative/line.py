@@ -16,6 +16,7 @@ import numpy.typing as npt
 from scipy import ndimage
 from simrail.estimators.odometry.line_table import PLACES_PER_M, line_table
 from simrail.estimators.odometry.pointing import chord_of, section_of
+from simrail.estimators.odometry.scale import scale_of
 from simrail.estimators.track_relative.dual import Dual, Vector
 from simrail.estimators.track_relative.states import S
 
@@ -93,7 +94,7 @@ def lines_of(recording: Recording) -> Lines:
     askew = _turns(under, np.column_stack([borne - under.roll_rad, pitch - under.pitch_rad, heading_askew]))
     if not _is_borne(recording):
         askew[:, 0] = 0.0  # an axle lies across both rails, however it is yawed on them
-    ramp = even + odd
+    ramp, ease_m = even + odd, scale_of(recording) * EASE_M
     in_transition = np.abs(even) + np.abs(odd) > NO_RAMP_1PM2
     share = np.where(in_transition, even / np.where(ramp == 0.0, 1.0, ramp), 0.0)
     roll_slope = np.where(in_transition, under.rates[:, 0], 0.0)
@@ -102,9 +103,9 @@ def lines_of(recording: Recording) -> Lines:
         askew_roll=askew[:, 0],
         askew_pitch=askew[:, 1],
         askew_yaw=askew[:, 2],
-        bend=_eased(table[:, 1]),
-        lean=_eased(borne),
-        dip=_eased(np.gradient(pitch, places)),
+        bend=_eased(table[:, 1], ease_m),
+        lean=_eased(borne, ease_m),
+        dip=_eased(np.gradient(pitch, places), ease_m),
         torsion=_roll_above(recording, places, borne) - borne,
         canted=_share_of_cant(under.roll_rad, curve),
         even=even,
@@ -128,8 +129,8 @@ def _turns(frame: TrackFrame, angles: FloatArray) -> FloatArray:
     return np.column_stack([roll - sp * yaw, cr * pitch + cp * sr * yaw, cp * cr * yaw - sr * pitch])
 
 
-def _eased(values: FloatArray) -> FloatArray:
-    return np.asarray(ndimage.gaussian_filter1d(values, EASE_M * PLACES_PER_M, mode="nearest"))
+def _eased(values: FloatArray, ease_m: float) -> FloatArray:
+    return np.asarray(ndimage.gaussian_filter1d(values, ease_m * PLACES_PER_M, mode="nearest"))
 
 
 def _is_borne(recording: Recording) -> bool:

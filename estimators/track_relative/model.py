@@ -5,6 +5,7 @@ with the body at rest in the map's track, then that of the smoothed train. The o
 place and speed are no measurements, since they are made of the same signals.
 """
 
+import math
 from collections.abc import Collection
 from typing import NamedTuple
 
@@ -12,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 from simrail.estimators.odometry.curve_matched import CurveMatchedOdometry, counts_at, first_speed
 from simrail.estimators.odometry.kernel import DIRECTION_SPEED_MPS, SATURATION_RADIUS_M
+from simrail.estimators.odometry.scale import scale_of
 from simrail.estimators.track_relative import states as at
 from simrail.estimators.track_relative.aiding import Aiding, Rows
 from simrail.estimators.track_relative.dual import table_of
@@ -93,6 +95,7 @@ def steps_of(recording: Recording, rate_hz: float, *, smoothed: bool = False) ->
         return np.asarray(values[: n * block].reshape(n, block, values.shape[1]).mean(axis=1))
 
     method = CurveMatchedOdometry(smoothed=smoothed and not recording.has_wheel)
+    method = method.at_scale(scale_of(recording))
     trace = method.trace(recording)
     odometry = mean(method.at_imu_times(trace, recording)[[*ODOMETRY, ODOMETRY_SD[0]]].to_numpy())
     ends = time[block - 1 :: block][:n]
@@ -200,7 +203,7 @@ def about(course: Course, states: FloatArray) -> Course:
     followed = np.zeros_like(states)
     followed[:, FOLLOWED] = states[:, FOLLOWED]
     speed, dt = states[:, at.V], course.steps.dt
-    jerk = _jerk(course.steps, speed, states[:, at.A])
+    jerk = _jerk(course.steps, speed, states[:, at.A], stands_mps(course.recording))
     around = course.around._replace(states=followed, jerk=jerk, sense=_sense(speed))
     return course._replace(around=around, way=0.5 * dt * (speed + np.concatenate([speed[:1], speed[:-1]])))
 
@@ -240,7 +243,7 @@ def _variances(course: Course, rows: slice) -> FloatArray:
     own = (motion.accel_x, motion.accel_y, motion.accel_z)
     rocks = motion.rocking**2
     rates = [gyro + rest + motion.gyro**2 * moves for rest in (rocks, rocks, 0.0)]
-    stands = np.abs(course.around.states[rows, at.V]) < STANDS_MPS
+    stands = np.abs(course.around.states[rows, at.V]) < stands_mps(course.recording)
     rests = np.outer((0.0, 0.0, motion.heaving**2), stands)
     forces = [accel + rest + sd**2 * moves for sd, rest in zip(own, rests, strict=True)]
     columns = [*rates, *forces]
@@ -253,17 +256,19 @@ def _flows(course: Course, ground: Ground, rows: slice) -> FloatArray:
     before = place[max(rows.start - 1, 0)]
     out = np.ones((len(way), FLOWS))
     curvature = ground.frame.rates[:, 2]
-    bent = SATURATION_RADIUS_M * curvature
+    scale = scale_of(course.recording)
+    bent = scale * SATURATION_RADIUS_M * curvature
     flank = bent / np.sqrt(1.0 + bent * bent)
     out[:, 0], out[:, 1] = np.abs(way), way
     out[:, 2], out[:, 3], out[:, 4] = way * curvature, -way * ground.even, -way * ground.odd
     out[:, 5], out[:, 6] = np.maximum(flank, 0.0), np.maximum(-flank, 0.0)
     element, curve, vertical = numbers_at(course.lines, np.concatenate([[before], place[rows]]))
     slips = course.steps.slipping[rows]
-    out[:, 12] = np.where(slips, LOST_M**2, CurveMatchedOdometry().wheel_walk_m * np.abs(way))
+    walk_m = CurveMatchedOdometry().at_scale(scale).wheel_walk_m
+    out[:, 12] = np.where(slips, LOST_M**2, walk_m * np.abs(way))
     if not course.around.in_time:
         out[:, 13] = np.exp(-np.abs(way) / course.around.slow_m)
-    out[:, 7] = np.where(vertical[1:] > 0.0, np.exp(-np.abs(way) / VERTICAL_LENGTH_M), 1.0)
+    out[:, 7] = np.where(vertical[1:] > 0.0, np.exp(-np.abs(way) / (scale * VERTICAL_LENGTH_M)), 1.0)
     out[np.diff(curve) != 0, 8:10] = 0.0
     # Element i lies between joints i and i + 1: a train from below has i behind it and meets i + 1, one
     # from above keeps i + 1 and meets i.
@@ -280,11 +285,18 @@ def _sense(speed: FloatArray) -> FloatArray:
     return np.where((last >= 0) & (speed[np.maximum(last, 0)] < 0.0), -1.0, 1.0)
 
 
-def _jerk(steps: Steps, speed: FloatArray, acceleration: FloatArray) -> FloatArray:
+def stands_mps(recording: Recording) -> float:
+    """`STANDS_MPS` of a vehicle of any scale: under the same gravity speeds are by the root of it."""
+    return math.sqrt(scale_of(recording)) * STANDS_MPS
+
+
+def _jerk(
+    steps: Steps, speed: FloatArray, acceleration: FloatArray, stands: float = STANDS_MPS
+) -> FloatArray:
     """Slope (n,) of the acceleration; no later value enters."""
     at_once = _slope(steps.signals[:, len(GYRO)], steps.dt, START_JERK_S)
     at_once[steps.resting & (np.abs(at_once) < LEAST_JERK_MPS3)] = 0.0
-    return np.where(np.abs(speed) < STANDS_MPS, at_once, _slope(acceleration, steps.dt, JERK_S))
+    return np.where(np.abs(speed) < stands, at_once, _slope(acceleration, steps.dt, JERK_S))
 
 
 def _slope(values: FloatArray, dt: float, over_s: float) -> FloatArray:

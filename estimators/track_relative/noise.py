@@ -13,6 +13,7 @@ from dataclasses import dataclass, fields, replace
 from typing import Any
 
 from simrail.estimators.odometry.pointing import OTHER_BODY, chord_of, pointing_of, section_of
+from simrail.estimators.odometry.scale import scale_of
 
 from simrail.core.errors import InputError, did_you_mean
 from simrail.recording.recording import Recording
@@ -181,12 +182,6 @@ CLASSES = {
 }
 """Classes of mounts, by the word that a tuned size begins with, e.g. ``axle_yaw_sd``."""
 
-STANDARD_BASE_M = 1.5
-"""Distance of the rails' heads where the gauge is 1.435 m, of which all that is in metres above speaks."""
-
-SAME_SCALE = 0.3
-"""Relative difference of gauges that makes no other scale: 1.0 to 1.676 m are all of full size."""
-
 MOST_DAMPING = 0.7
 """Of a body that sways, as a ratio."""
 
@@ -212,12 +207,6 @@ def motion_of(recording: Recording, tuned: Mapping[Motion, Motion] | None = None
     if scale == 1.0:
         return motion
     return at_scale(model_body(motion, scale) if motion.sway_hz > 0.0 else motion, scale)
-
-
-def scale_of(recording: Recording) -> float:
-    """Of a model track; 1 for every gauge of full size."""
-    scale = recording.track.rail_base_m / STANDARD_BASE_M
-    return 1.0 if abs(scale - 1.0) < SAME_SCALE else scale
 
 
 def slow_m_of(recording: Recording) -> float:

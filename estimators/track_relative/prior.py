@@ -11,6 +11,7 @@ import numpy as np
 from simrail.estimators.odometry.curve_matched import CurveMatchedOdometry, first_speed, rolling_share
 from simrail.estimators.odometry.moving_start import ACCELERATION_SD_MPS2
 from simrail.estimators.odometry.pointing import chainage_sd, chord_of, lag_of, pointing_of
+from simrail.estimators.odometry.scale import scale_of
 from simrail.estimators.track_relative import states as at
 from simrail.estimators.track_relative.kernel import Noise
 from simrail.estimators.track_relative.noise import Motion, slow_m_of
@@ -64,7 +65,8 @@ PARTS = {
 
 def noise_of(recording: Recording, motion: Motion, without: Collection[str] = ()) -> Noise:
     """Sizes of the processes; 0 for what is left out."""
-    errors, sheet, method = recording.map_errors, recording.imu_sheet, CurveMatchedOdometry()
+    errors, sheet, scale = recording.map_errors, recording.imu_sheet, scale_of(recording)
+    method, pointing = CurveMatchedOdometry().at_scale(scale), pointing_of(recording, chord_of(recording))
     base = recording.track.rail_base_m
     along = 0.0 if "cant_along" in without else errors.cant_along_sd_m / base
     angles = [motion.roll_sd, motion.pitch_sd, motion.yaw_sd, along]
@@ -89,7 +91,7 @@ def noise_of(recording: Recording, motion: Motion, without: Collection[str] = ()
         jerk=JERK_M2PS5,
         tread_sd=method.tread_sd * rolling_share(recording),
         tread_length=method.tread_length_m,
-        lag_walk=0.0 if "lag" in without else pointing_of(recording, chord_of(recording)).lag_walk_m,
+        lag_walk=0.0 if "lag" in without else pointing.at_scale(scale).lag_walk_m,
         gyro_walk=0.0 if "gyro_bias" in without else _walk(sheet, "gyro"),
         accel_walk=0.0 if "accel_bias" in without else _walk(sheet, "accel"),
         forgotten_sd=np.array([kept["slope"], kept["curve"], kept["cant"], kept["joints"], kept["joints"]]),
@@ -168,9 +170,9 @@ def _body_sds(sd: FloatArray, noise: Noise) -> None:
 
 def _train_sds(sd: FloatArray, recording: Recording, motion: Motion) -> None:
     """Place, wheel, heading, and how the body follows cant, curves and traction."""
-    errors, wheel, method = recording.map_errors, recording.encoder_sheet, CurveMatchedOdometry()
-    chord = chord_of(recording)
-    pointing = pointing_of(recording, chord)
+    errors, wheel, scale = recording.map_errors, recording.encoder_sheet, scale_of(recording)
+    method, chord = CurveMatchedOdometry().at_scale(scale), chord_of(recording)
+    pointing = pointing_of(recording, chord).at_scale(scale)
     sd[at.S] = math.hypot(method.start_sd_m, chainage_sd(recording, recording.start_position_m))
     speed, speed_sd = first_speed(recording)
     sd[at.V], sd[at.A] = speed_sd, 1e-2 if speed == 0.0 else ACCELERATION_SD_MPS2
@@ -188,8 +190,8 @@ def _train_sds(sd: FloatArray, recording: Recording, motion: Motion) -> None:
     sd[at.Y_TILT], sd[at.Y_BEND] = motion.y_tilt_sd, motion.y_bend_sd
     sd[at.LAG] = math.hypot(
         pointing.lag_sd_m,
-        LAG_RADIUS_M * pointing.turn_sd_rad,
-        ATTACK_LAG_M if pointing.attacks else 0.0,
+        scale * LAG_RADIUS_M * pointing.turn_sd_rad,
+        scale * ATTACK_LAG_M if pointing.attacks else 0.0,
         0.0 if chord is None else lag_of(chord)[1],
     )
     sd[at.LEAD] = pointing.lead_sd_m

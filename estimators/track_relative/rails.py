@@ -6,7 +6,8 @@ rails are:
 * on an axle, whose wheels stand on them: at once;
 * on a bogie frame of full size of which the drawing has springs and masses: under them
   (`simrail.estimators.track_relative.under_frame`);
-* with a rail sensor: by what it sees from the body, on a body of a model too;
+* with a rail sensor: by what it sees from the body, on a body of a model too, whose two ends tell by its
+  gyros where its accelerometers err (`simrail.estimators.track_relative.both_ends`);
 * on a mount of any other kind: as by the body itself.
 
 The map errs in its cant. What of that the smoother finds is no irregularity and is taken off, as is what a
@@ -23,6 +24,8 @@ import numpy as np
 import pandas as pd
 from scipy import ndimage, signal
 from scipy.interpolate import CubicSpline
+from simrail.estimators.odometry.scale import scale_of
+from simrail.estimators.track_relative.both_ends import Ends, ends_of, missed, still_missed
 from simrail.estimators.track_relative.full_rate import (
     Chain,
     Held,
@@ -38,7 +41,7 @@ from simrail.estimators.track_relative.full_rate import (
 )
 from simrail.estimators.track_relative.kernel import OUTPUTS
 from simrail.estimators.track_relative.line import Lines
-from simrail.estimators.track_relative.noise import AXLE, FRAME, class_of, scale_of
+from simrail.estimators.track_relative.noise import AXLE, FRAME, class_of
 from simrail.estimators.track_relative.output import Trace
 from simrail.estimators.track_relative.states import ROLL, ROLL_SLOW
 from simrail.estimators.track_relative.suspension import bogie_of
@@ -153,10 +156,14 @@ def rails_of(
         wheels[1:] = 0.0
     for sd, variance in zip(IRREGULARITY_SD, wheels, strict=True):
         geometry[sd] = np.hypot(geometry[sd], np.sqrt(variance))
+    ends = ends_of(recording, trace) if sees_as_a_model and len(geometry) >= LEAST_STEPS else None
+    if ends is not None:
+        moved = np.column_stack([motions.values["across"][:, 1], motions.values["heave"][:, 0]])
+        geometry[list(IRREGULARITY[:2])] -= missed(ends, sight, moved[sight.use], step_m)
     drawn = None
     if draws:
         drawn = _draws(
-            recording, trace.course.lines, geometry, sight, slow, motions, under, wheels, step_m, draws
+            recording, trace.course.lines, geometry, sight, slow, motions, under, ends, wheels, step_m, draws
         )
     return replace(estimate, geometry=geometry, geometry_draws=drawn)
 
@@ -270,6 +277,7 @@ def _draws(
     slow: FloatArray,
     motions: Motions,
     under: Under | None,
+    ends: Ends | None,
     wheels: FloatArray,
     step_m: float,
     count: int,
@@ -300,6 +308,8 @@ def _draws(
         if sight.noise_sd > 0.0:
             rails += sight.noise_sd * np.sqrt([0.5, 0.5, 2.0, 2.0]) * rng.standard_normal(rails.shape)
         drawn[draw] = over_space(place, rails, step_m=step_m).values
+        if ends is not None:
+            drawn[draw][:, :2] -= still_missed(ends, sight, felt[sight.use][:, 1:], step_m, rng)
         if under is not None:
             drawn[draw][:, 1:3] = draw_under(under, _frame_motion(errors), rng)
         drawn[draw] += np.sqrt(wheels) * rng.standard_normal(lines.shape)

@@ -17,12 +17,16 @@ import pytest
 from scipy import signal
 from simrail.estimators.attitude.rest_bias import rest_bias
 from simrail.estimators.baselines import ZeroTrack
+from simrail.estimators.track_relative import rails as rails_of_body
+from simrail.estimators.track_relative.model import steps_of
+from simrail.estimators.track_relative.smoother import TrackRelativeSmoother
 from simrail.estimators.trajectory.smoother import TrajectorySmoother
 from simrail.estimators.tuning.file import Tuning
 
 from simrail.campaign.campaign import run_campaign
 from simrail.campaign.cell import record_cell
 from simrail.core.columns import GYRO
+from simrail.core.jit import FloatArray
 from simrail.core.toml_files import shipped
 from simrail.estimation.estimate import Estimate, Estimator
 from simrail.recording.recording import Recording
@@ -124,6 +128,63 @@ def test_over_twenty_draws_it_errs_less_than_the_paper() -> None:
             assert len(ours) == len(blind) == 20
             assert np.sqrt(np.mean(ours**2)) <= most
             assert np.sqrt(np.mean(blind**2)) > np.sqrt(np.mean(ours**2))
+
+
+# The track-relative smoother, whose body of a model is seen at full rate.
+
+SCALED_D1 = Band("scaled_d1", 0.3, 2.5)
+IN_FULL = TrackRelativeSmoother(geometry_step_m=STEP_M, draws=20)
+RAILS = ("vertical_profile", "cross_level", "alignment")
+
+
+def in_d1(estimate: Estimate, recording: Recording, rails: LaidTrack, metric: str) -> FloatArray:
+    rows = score_geometry(estimate, rails, recording, bands=[SCALED_D1], windows=["whole"], metrics=[metric])
+    rows = rows[(rows["band"] == SCALED_D1.name) & (rows["status"] == OK)].set_index("quantity")
+    return rows.loc[list(RAILS), "value"].to_numpy(dtype=np.float64)
+
+
+def test_the_rails_of_a_models_body_are_near_and_their_intervals_hold(
+    ride: tuple[Rides, LaidTrack], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One ride with three devices; without the ends of the body profile and alignment err twice as much."""
+    record, rails = ride
+    recordings = record(grade("lord_3dm_gx4_25"))
+    estimates = [IN_FULL.estimate(recording) for recording in recordings]
+
+    def pooled(metric: str, found: list[Estimate]) -> FloatArray:
+        each = [in_d1(one, seen, rails, metric) for one, seen in zip(found, recordings, strict=True)]
+        return np.asarray(np.sqrt(np.mean(np.square(each), axis=0)))
+
+    covered, error = pooled("coverage95", estimates), pooled("sd", estimates)
+    assert (covered > 0.85).all()  # of one draw of the rails: some twenty waves of the longest
+    assert (error < [0.05, 0.08, 0.07]).all()
+    monkeypatch.setattr(rails_of_body, "ends_of", lambda *_: None)
+    alone = [replace(IN_FULL, draws=0).estimate(recording) for recording in recordings]
+    assert (pooled("sd", alone)[[0, 2]] > 1.6 * error[[0, 2]]).all()
+
+
+def test_a_rolling_wheel_of_a_model_does_not_slip(ride: tuple[Rides, LaidTrack]) -> None:
+    """A body that sways as by its scale alone was .4 m off its own wheel, which knows to centimetres."""
+    for recording in ride[0](grade("lord_3dm_gx4_25")):
+        steps = steps_of(recording, 31.25)
+        assert recording.odometry is not None and not steps.slipping.any()
+        wheel = np.interp(steps.time_s, recording.odometry.index, recording.odometry["position_m"])
+        assert np.abs(steps.odometry[:, 0] - wheel).max() < 0.12
+
+
+@pytest.mark.slow
+def test_intervals_of_the_rails_hold_over_six_rides() -> None:
+    """Six draws of the rails, a device each: by as many waves the share is known to some 3 %."""
+    scenario = load_scenario("scale_greatest", overrides=["monte_carlo.track_draws=6"])
+    parts, covered, greatest = Parts(scenario), [], []
+    for cell in cells(scenario):
+        recording = record_cell(cell, simulate(parts.ride(cell)), parts)
+        estimate = IN_FULL.estimate(recording)
+        covered.append(in_d1(estimate, recording, parts.rails(cell), "coverage95"))
+        greatest.append(in_d1(estimate, recording, parts.rails(cell), "max"))
+    assert (np.mean(covered, axis=0) > 0.90).all()
+    assert (np.mean(covered, axis=0) < 0.99).all()
+    assert (np.mean(greatest, axis=0) < [0.16, 0.25, 0.22]).all()
 
 
 # The peak at the start. A fixed-interval smoother balances what its model does not have, from both sides; in
