@@ -398,7 +398,7 @@ def _packed(values: FloatArray) -> list[Any]:
     return [low, step, b64encode(steps.tobytes()).decode("ascii")]
 
 
-def _numbers(held: Sequence[Any] | str) -> FloatArray:
+def _numbers(held: list[Any] | str) -> FloatArray:
     """What `_packed` wrote; pages that version 0.2.0 or one before wrote have float32."""
     if isinstance(held, str):
         return np.frombuffer(b64decode(held), dtype="<f4").astype(np.float64)
