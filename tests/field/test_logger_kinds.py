@@ -517,7 +517,7 @@ def test_a_file_of_another_time_zone_is_told_with_the_setting_that_mends_it(
 @pytest.mark.parametrize(
     ("plant", "said"),
     [
-        (lambda frame, draw: frame["az"] + 0.05 * draw, "noise of 0.58 m/s2 a sample at rest is 132 times"),
+        (lambda frame, draw: frame["az"] + 0.05 * draw, "noise of 0.58 m/s2 a sample at rest is 13"),
         (lambda frame, draw: (frame["az"] / 0.016).round() * 0.016, "stands in steps of 0.157 m/s2"),
         (lambda frame, draw: frame["az"], ""),
     ],
