@@ -16,7 +16,17 @@ from scipy.linalg import qr
 from simrail.core.jit import FloatArray
 from simrail.recording.evidence.finding import LIKELY, SURE
 from simrail.recording.evidence.fit import Fit, Near, fit, hints, linear
-from simrail.recording.evidence.model import CHANNELS, GAINS, INDEX, LATES, THEN, Ride, start_values
+from simrail.recording.evidence.model import (
+    CHANNELS,
+    FORCE_X,
+    GAINS,
+    INDEX,
+    LATES,
+    THEN,
+    Ride,
+    start_values,
+)
+from simrail.recording.evidence.readings import expected
 from simrail.recording.evidence.search import explains
 from simrail.recording.evidence.single import WHOLE, WORTH, Single, left_over
 from simrail.recording.evidence.slack import accused, distance, slack_of
@@ -46,6 +56,10 @@ TRIED, FEW, ROUGH = 2, 6, 4
 
 JERK_S = 2.0
 """How long before and after it a change of the wheel shows in its acceleration."""
+
+OTHER_WAY = -2.0
+"""Change of the factor of a wheel whose counter runs the other way from then on: far from any that a fit
+without it takes, of which a ride that has this for half of its time shows none."""
 
 STRAINED = 10.0
 """Strain of a fit from which on it is bent; sound rides, and those with one fault, have up to five."""
@@ -117,11 +131,8 @@ def bent(ride: Ride, found: Fit) -> list[Change]:
     kept = np.setdiff1d(np.arange(len(near.sds)), [near.column(name) for name in WHOLE])
     told = _Left(near, near.rest * near.seen[:, None], found.noise, kept.tolist()).best()[:TRIED]
     for group in BENT:
-        begin = _start(group, found)
-        fits = {
-            then: fit(_changing(ride, group, then), begin, free=group, rounds=ROUGH)
-            for then in _moments(count, FEWER)
-        }
+        moments = [*_moments(count, FEWER), *([_turned(ride)] if group == BENT[1] else [])]
+        fits = {then: _best_from(_changing(ride, group, then), group, found, ROUGH) for then in moments}
         told.append(Change(group, min(fits, key=lambda then: fits[then].cost), 1.0))
     return told
 
@@ -141,6 +152,16 @@ def _start(group: tuple[str, ...], found: Fit) -> FloatArray:
         of = THEN[name]
         x[INDEX[name]] = found.value(of) - x[INDEX[of]]
     return x
+
+
+def _starts(group: tuple[str, ...], found: Fit) -> list[FloatArray]:
+    """Values that a change is sought from; of a wheel also those of one that counts the other way then."""
+    starts = [_start(group, found)]
+    if group == BENT[1]:
+        turned = start_values()
+        turned[INDEX[group[0]]] = OTHER_WAY
+        starts.append(turned)
+    return starts
 
 
 def _moments(count: int, most: int) -> list[int]:
@@ -202,7 +223,7 @@ def _moved(ride: Ride, change: Change, before: Fit) -> tuple[Ride, Fit]:
 
     def at(then: int, rounds: int) -> tuple[Ride, Fit]:
         other = _changing(ride, change.group, then)
-        return other, fit(other, _start(change.group, before), free=change.group, rounds=rounds)
+        return other, _best_from(other, change.group, before, rounds)
 
     count = len(ride.measured)
     best = at(change.then, FEW)
@@ -220,6 +241,19 @@ def _moved(ride: Ride, change: Change, before: Fit) -> tuple[Ride, Fit]:
             step //= 2
     assert best[0].then is not None
     return at(best[0].then, 15)
+
+
+def _turned(ride: Ride) -> int:
+    """Block from which on a wheel that counts the other way agrees best with the accelerometer's push."""
+    wheel, felt = expected(ride, start_values())[:, FORCE_X], ride.measured[:, FORCE_X]
+    along = np.cumsum(wheel * (felt - np.median(felt)))
+    return ENDS + int(np.argmax(2.0 * along[ENDS:-ENDS] - along[-1])) + 1
+
+
+def _best_from(ride: Ride, group: tuple[str, ...], before: Fit, rounds: int) -> Fit:
+    """The best fit with a change, of those from all starts."""
+    fits = [fit(ride, begin, free=group, rounds=rounds) for begin in _starts(group, before)]
+    return min(fits, key=lambda one: one.cost)
 
 
 def _moment_s(ride: Ride) -> float:
