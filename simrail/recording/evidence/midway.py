@@ -61,6 +61,13 @@ OTHER_WAY = -2.0
 """Change of the factor of a wheel whose counter runs the other way from then on: far from any that a fit
 without it takes, of which a ride that has this for half of its time shows none."""
 
+AGREES, BOTH = 0.75, 0.1
+"""Correlation of wheel and push, turned at a moment, from which on a counter has turned its sign; and
+what either side of the moment has of it at least."""
+
+MOST_PUSH_MPS2 = 3.0
+"""An acceleration that no train has."""
+
 STRAINED = 10.0
 """Strain of a fit from which on it is bent; sound rides, and those with one fault, have up to five."""
 
@@ -85,9 +92,12 @@ def change_of(ride: Ride, found: Fit, blamed: int) -> tuple[Ride, Single] | None
     blamed : int
         How many figures it has wrong.
     """
+    turned = _turned(ride)
     looked_at = changes(ride, found)[:TRIED]
     if blamed > 1 or found.strain > STRAINED:
         looked_at += bent(ride, found)
+    if turned is not None:
+        looked_at = [Change(BENT[1], turned, 1.0)]
     told = []
     for change in looked_at:
         other, one = _moved(ride, change, found)
@@ -96,7 +106,7 @@ def change_of(ride: Ride, found: Fit, blamed: int) -> tuple[Ride, Single] | None
         wrong = tuple(name for name in change.group if off[name] > LIKELY)
         if max(off.values()) < SURE or accused(one, slack, WHOLE) or not explains(other, one):
             continue
-        if _left_over(one, wrong, one.noise) < LESS * left_over(found, one.noise):
+        if turned is not None or _left_over(one, wrong, one.noise) < LESS * left_over(found, one.noise):
             told.append((other, one, wrong, change.group))
     if not told:
         return None
@@ -131,8 +141,10 @@ def bent(ride: Ride, found: Fit) -> list[Change]:
     kept = np.setdiff1d(np.arange(len(near.sds)), [near.column(name) for name in WHOLE])
     told = _Left(near, near.rest * near.seen[:, None], found.noise, kept.tolist()).best()[:TRIED]
     for group in BENT:
-        moments = [*_moments(count, FEWER), *([_turned(ride)] if group == BENT[1] else [])]
-        fits = {then: _best_from(_changing(ride, group, then), group, found, ROUGH) for then in moments}
+        fits = {
+            then: _best_from(_changing(ride, group, then), group, found, ROUGH)
+            for then in _moments(count, FEWER)
+        }
         told.append(Change(group, min(fits, key=lambda then: fits[then].cost), 1.0))
     return told
 
@@ -243,11 +255,21 @@ def _moved(ride: Ride, change: Change, before: Fit) -> tuple[Ride, Fit]:
     return at(best[0].then, 15)
 
 
-def _turned(ride: Ride) -> int:
-    """Block from which on a wheel that counts the other way agrees best with the accelerometer's push."""
+def _turned(ride: Ride) -> int | None:
+    """Block from which on a wheel counts the other way, by the accelerometer; None if it does not.
+
+    However a fit without that bends, even out of the map: wheel and push agree up to there, and then with
+    the other sign.
+    """
     wheel, felt = expected(ride, start_values())[:, FORCE_X], ride.measured[:, FORCE_X]
-    along = np.cumsum(wheel * (felt - np.median(felt)))
-    return ENDS + int(np.argmax(2.0 * along[ENDS:-ENDS] - along[-1])) + 1
+    # Where it turns, a wheel seems to jerk as no train does.
+    felt, wheel = felt - np.median(felt), np.where(np.abs(wheel) > MOST_PUSH_MPS2, 0.0, wheel)
+    along = np.cumsum(wheel * felt) / max(float(np.linalg.norm(wheel) * np.linalg.norm(felt)), 1e-12)
+    if len(along) <= 2 * ENDS:
+        return None
+    then = ENDS + int(np.argmax(2.0 * along[ENDS:-ENDS] - along[-1]))
+    parts = along[then], along[then] - along[-1]
+    return then + 1 if sum(parts) > AGREES and min(parts) > BOTH else None
 
 
 def _best_from(ride: Ride, group: tuple[str, ...], before: Fit, rounds: int) -> Fit:
