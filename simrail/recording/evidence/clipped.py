@@ -50,7 +50,8 @@ def weigh_clipped(recording: Recording) -> tuple[Finding, ...]:
             if float(np.diff(values, n=2).std()) < LIVING * sample:
                 continue  # what was smoothed stands at a value
             others = recording.imu[[other for other in names if other != name]].to_numpy()
-            if _is_unsigned(values, others, sample):
+            # An accelerometer passes 0 too fast to tell, and in curves of one side it has one sign.
+            if names is GYRO and _is_unsigned(values, others, sample):
                 found.append(_without_sign(name, values))
                 continue
             for side in (1.0, -1.0):
@@ -87,6 +88,8 @@ def _is_unsigned(values: FloatArray, others: FloatArray, noise: float) -> bool:
     # Under way a body shakes: what is near by is taken from what one sample differs from the next.
     size, near = np.abs(values), max(noise, float(np.diff(values, n=2).std()) / math.sqrt(6.0))
     count, next_to = int(np.sum(size < 0.5 * near)), int(np.sum((size >= 0.5 * near) & (size < near)))
+    if len(np.unique(size[size < near])) < 3:
+        return False  # rounded: what is small is 0
     return count >= max(AT_ZERO, next_to // 2) and float(size.max()) > near
 
 
