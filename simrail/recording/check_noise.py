@@ -52,7 +52,7 @@ class _Signal(NamedTuple):
     values: FloatArray
     steps: FloatArray
     noise: float
-    count: float
+    least: float
     sheet: ImuSheet
 
     def beside(self, found: float) -> str:
@@ -187,7 +187,7 @@ def _rounded(signal: _Signal) -> list[str]:
     steps = signal.steps
     axis = int(np.argmax(np.where(np.isfinite(steps), steps, 0.0)))
     step, first = float(steps[axis]), signal.values[0, axis]
-    if not np.isfinite(step) or step < max(ROUNDED * signal.noise, 2.0 * signal.count):
+    if not np.isfinite(step) or step < max(ROUNDED * signal.noise, 2.0 * signal.least):
         return []
     counts = (signal.values[:, axis] - first) / step
     if np.abs(counts - np.rint(counts)).max() > 0.01:
