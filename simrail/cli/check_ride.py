@@ -10,6 +10,8 @@ from simrail.cli.options import DONE, number
 from simrail.core.errors import InputError
 from simrail.core.toml_files import label, read_toml
 from simrail.estimation.recorded_ride import judged_ride
+from simrail.recording.check_field import field_warnings
+from simrail.recording.check_noise import noise_warnings
 from simrail.recording.evidence.devices import weigh_all
 from simrail.recording.evidence.judge import Evidence
 from simrail.recording.files.mend import write_mended
@@ -49,11 +51,13 @@ def check_ride(path: Path, write: Path | None) -> int:
     print_evidence(console, evidence, title=f"{label(ride_file(path))}: {recording.name}")
     for note in recording.notes:
         console.print(f"note: {note}", markup=False, soft_wrap=True)
+    told = (*noise_warnings(recording), *field_warnings(recording))
+    for warning in told:
+        console.print(f"warning: {warning}", markup=False, soft_wrap=True)
     if write is None:
         judged_ride(path)
-        console.print(
-            f"{recording.name}: fine" if not evidence.wrong else f"{recording.name}: likely wrong in part"
-        )
+        fine = "fine, but for the warnings" if told else "fine"
+        console.print(f"{recording.name}: {fine if not evidence.wrong else 'likely wrong in part'}")
         return DONE
     if not evidence.wrong:
         judged_ride(path)

@@ -75,7 +75,7 @@ def estimate(
     from simrail.cli.estimate_ride import DEFAULT, chosen_methods, estimate_ride, ride_with_warnings
     from simrail.core.toml_files import blame, label
     from simrail.recording.check_field import field_warnings
-    from simrail.recording.check_sheet import noise_warnings
+    from simrail.recording.check_noise import noise_warnings
     from simrail.recording.files.ride_reader import ride_file
 
     chosen, wanted, named = form_of(form), _units(units), list(estimators or [])

@@ -1,15 +1,15 @@
-"""Is this the device of that sheet? A whole signal held against the sheet: its range, its noise at rest.
+"""Is this the device of that sheet? A whole signal held against the sheet: its range.
 
-Single samples that are no measurements were refused before (`simrail.recording.check_samples`).
+Single samples that are no measurements were refused before (`simrail.recording.check_samples`); its noise is
+judged by `simrail.recording.check_noise`.
 """
 
 import numpy as np
 
 from simrail.core.columns import ACCEL, GYRO
 from simrail.core.errors import InputError
-from simrail.recording.check_samples import SLACK, STUCK_COUNTS, imu_bounds
+from simrail.recording.check_samples import SLACK, imu_bounds
 from simrail.recording.recording import Recording, imus
-from simrail.recording.standstill import at_rest_initially
 
 _TRIADS = (("gyro", GYRO, "rad/s"), ("accel", ACCEL, "m/s2"))
 _TURNED = float(np.sqrt(3.0))
@@ -46,45 +46,3 @@ def _check_ranges(recording: Recording, table: str) -> None:
                     limit=f"{limit:.6g} {unit}, the range of {bounds[kind].sheet}",
                     remedy="mend the range in its sheet: a device measures no further",
                 )
-
-
-LOUD, SILENT = {"gyro": 10.0, "accel": 30.0}, 0.1
-"""Noise at rest over that of the sheet from which on it is told: an engine that idles shakes the
-accelerometer more than the gyro; and below which samples were smoothed, or are of a better device."""
-
-REST_SAMPLES = 100
-
-
-def noise_warnings(recording: Recording) -> tuple[str, ...]:
-    """Warnings, a line each, of a noise at rest that is far from what the sheet says.
-
-    The noise of a sample is taken from second differences of the initial rest, x[k-1] - 2 x[k] + x[k+1] over
-    sqrt(6): bias and its wandering do not show in them.
-    """
-    return tuple(line for table, alone in imus(recording) for line in _noise_warnings(alone, table))
-
-
-def _noise_warnings(recording: Recording, table: str) -> tuple[str, ...]:
-    resting, sheet = at_rest_initially(recording), recording.imu_sheet
-    if resting < REST_SAMPLES:
-        return ()
-    told = []
-    for kind, columns, unit in _TRIADS:
-        stated = imu_bounds(sheet)[kind].noise * np.sqrt(sheet.rate_hz)
-        values = recording.imu[list(columns)].to_numpy()
-        steps = np.abs(np.diff(values, axis=0))
-        count = float(steps[steps > 1e-9 * stated].min(initial=np.inf))
-        found = float(np.diff(values[:resting], n=2, axis=0).std(axis=0).max()) / np.sqrt(6.0)
-        if stated == 0.0 or stated < STUCK_COUNTS * count:
-            continue
-        if not SILENT < found / stated < LOUD[kind]:
-            why = (
-                "the device is another, or shakes while the train stands"
-                if found > stated
-                else "the samples were smoothed, or the device is another"
-            )
-            told.append(
-                f"{table}.{kind}: noise of {found:.2g} {unit} a sample at rest is {found / stated:.2g} times "
-                f"that of {sheet.grade} ({stated:.2g} {unit} at {sheet.rate_hz:g} Hz): {why}"
-            )
-    return tuple(told)

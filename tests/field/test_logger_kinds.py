@@ -14,6 +14,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from simrail.cli.main import call
 from simrail.core.errors import InputError
 from simrail.estimation.choose_odometry import with_odometry
 from simrail.recording.check_physics import check_plausible
@@ -511,3 +512,27 @@ def test_a_file_of_another_time_zone_is_told_with_the_setting_that_mends_it(
     ride = (folder / "ride.toml").read_text().replace("[encoder]\n", f"[encoder]\n{setting[1]}\n")
     (folder / "ride.toml").write_text(ride)
     assert_as_sound(read_signals(folder), sound)
+
+
+@pytest.mark.parametrize(
+    ("plant", "said"),
+    [
+        (lambda frame, draw: frame["az"] + 0.05 * draw, "noise of 0.58 m/s2 a sample at rest is 13"),
+        (lambda frame, draw: (frame["az"] / 0.016).round() * 0.016, "stands in steps of 0.157 m/s2"),
+        (lambda frame, draw: frame["az"], ""),
+    ],
+)
+def test_check_tells_noise_and_steps_that_the_sheet_does_not_have(
+    plant: Callable[[pd.DataFrame, np.ndarray], pd.Series],
+    said: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """The ride stands for 4.8 s at first: 96 samples."""
+    frame = logged()
+    spoiled = frame.assign(az=plant(frame, np.random.default_rng(4).standard_normal(len(frame))).round(6))
+    folder = written(tmp_path, spoiled.to_csv(index=False))
+    assert call(["check", str(folder / "ride.toml")]) == 0
+    shown = capsys.readouterr().out
+    assert ("warning: imu.accel: " + said in shown) if said else ("warning" not in shown), shown
+    assert ("fine, but for the warnings" in shown) == bool(said)

@@ -66,6 +66,16 @@ def test_a_change_is_told_with_its_size_and_its_moment(
     assert "cut the recording" in found.remedy
 
 
+@pytest.mark.parametrize("share", [0.5, pytest.param(0.35, marks=LONG)])
+def test_a_counter_that_turns_its_sign_is_told_with_the_moment(share: float, sound: Recording) -> None:
+    evidence = weigh_all(counted_otherwise(sound, -1.0, share))
+    assert [finding.key for finding in evidence.wrong] == ["then_wheel"]
+    found = evidence.of("then_wheel")
+    assert found.value == pytest.approx(-2.0, abs=0.1)
+    said = found.why.partition("time_s = ")[2].partition(" on ")[0]
+    assert float(said) == pytest.approx(40.0 * share, abs=1.0)
+
+
 def test_of_a_ride_in_which_nothing_changes_nothing_is_said(sound: Recording) -> None:
     ride = ride_of(sound)
     assert ride is not None

@@ -12,8 +12,9 @@ import pytest
 from simrail.core.columns import MAGNETIC
 from simrail.core.errors import InputError
 from simrail.estimation.choose_odometry import with_odometry
+from simrail.recording.check_noise import noise_warnings
 from simrail.recording.check_physics import check_plausible
-from simrail.recording.check_sheet import check_ranges, noise_warnings
+from simrail.recording.check_sheet import check_ranges
 from simrail.recording.evidence.devices import weigh_all
 from simrail.recording.evidence.field_clock import _longer, weigh_field_clock
 from simrail.recording.evidence.finding import Finding

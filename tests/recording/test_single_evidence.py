@@ -202,6 +202,19 @@ def test_a_wheel_that_slips_is_no_fault_of_the_file(sound: Recording) -> None:
     assert evidence.of("wheel").value == pytest.approx(1.0, abs=0.05)
 
 
+@pytest.mark.parametrize("column", ["gyro_x_radps", *(pytest.param(name, marks=LONG) for name in GYRO[1:])])
+def test_an_axis_without_its_sign_is_told_as_that(column: str, sound: Recording) -> None:
+    evidence = weigh_all(replace(sound, imu=sound.imu.assign(**{column: sound.imu[column].abs()})))
+    (found,) = evidence.wrong
+    assert found.key == f"unsigned_{column}" and found.verdict == "surely wrong"
+    assert "never below" in found.why and "with its sign" in found.remedy
+    # Gravity never changes its sign, and an axis that only ends at 0 has few samples there.
+    assert not weigh_clipped(sound)
+    ending = sound.imu[column] - sound.imu[column].min()
+    told = weigh_clipped(replace(sound, imu=sound.imu.assign(**{column: ending})))
+    assert not any(finding.key.startswith("unsigned") for finding in told)
+
+
 @pytest.mark.long
 def test_factors_of_single_columns_are_written_and_mend_the_ride(sound: Recording, tmp_path: Path) -> None:
     """The Y of the body is minus the y of the device: the column is found through its axes."""

@@ -116,6 +116,12 @@ def test_sound_rides_raise_no_alarm(recordings: list[tuple[str, Recording]]) -> 
 
 
 @pytest.mark.slow
+def test_a_wheel_that_slips_on_leaves_is_no_other_wheel_and_no_other_clock() -> None:
+    """Seed 8802: a straight line and rough rails, on which no fit finds the way without the slides."""
+    assert false_alarms(list(rides((("leaves", (), 1, 2),), 8802))) == []
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("key", "size"),
     [

@@ -1,7 +1,8 @@
-"""A device that shows nothing beyond some value: flat tops of a range that is smaller than its sheet's.
+"""A device that shows nothing beyond some value: flat tops of a range that is smaller than its sheet's, or 0.
 
 The greatest value of a signal with noise is rare, and the values just below it are less so. Where it stands
-many more times than the values below it let expect, the device was at the end of its range.
+many more times than the values below it let expect, the device was at the end of its range. A signal that
+comes to 0 time and again and never goes beyond, while the axes beside it do, has lost its sign.
 """
 
 import math
@@ -26,6 +27,11 @@ AT_RANGE = 0.99
 """Share of the range of the sheet from which on a device has done what its sheet says."""
 
 
+AT_ZERO = 20
+"""Samples within half the noise of a sample of 0, on one side alone, from which on a sign is missing: of a
+signal that only happens to end there its last few are so near."""
+
+
 def weigh_clipped(recording: Recording) -> tuple[Finding, ...]:
     """What a ride says of the ranges of its IMU: a finding for each axis that is cut off.
 
@@ -43,6 +49,11 @@ def weigh_clipped(recording: Recording) -> tuple[Finding, ...]:
             values, sample = recording.imu[name].to_numpy(), noise * math.sqrt(sheet.rate_hz)
             if float(np.diff(values, n=2).std()) < LIVING * sample:
                 continue  # what was smoothed stands at a value
+            others = recording.imu[[other for other in names if other != name]].to_numpy()
+            # An accelerometer passes 0 too fast to tell, and in curves of one side it has one sign.
+            if names is GYRO and _is_unsigned(values, others, sample):
+                found.append(_without_sign(name, values))
+                continue
             for side in (1.0, -1.0):
                 count, top, step = _flat(side * values)
                 if count and step < sample and (most is None or abs(top) < AT_RANGE * most):
@@ -67,6 +78,38 @@ def _flat(values: FloatArray) -> tuple[int, float, float]:
     step = float(min(steps[steps > slack].min(initial=math.inf), top - below[0]))
     expected = BELOW * step / float(top - below[-1])
     return (count if poisson.sf(count - 1, expected) < CHANCE else 0), top, step
+
+
+def _is_unsigned(values: FloatArray, others: FloatArray, noise: float) -> bool:
+    """Whether a signal (n,) lost its sign: it is dense up to 0 and has one side, an other (n, 2) has two."""
+    two_sided = (others.min(axis=0) < 0.0) & (others.max(axis=0) > 0.0)
+    if values.min() < 0.0 < values.max() or not two_sided.any():
+        return False
+    # Under way a body shakes: what is near by is taken from what one sample differs from the next.
+    size, near = np.abs(values), max(noise, float(np.diff(values, n=2).std()) / math.sqrt(6.0))
+    count, next_to = int(np.sum(size < 0.5 * near)), int(np.sum((size >= 0.5 * near) & (size < near)))
+    if len(np.unique(size[size < near])) < 3:
+        return False  # rounded: what is small is 0
+    return count >= max(AT_ZERO, next_to // 2) and float(size.max()) > near
+
+
+def _without_sign(name: str, values: FloatArray) -> Finding:
+    """The finding of a signal that comes to 0 and never goes beyond."""
+    side = "below" if values.max() > 0.0 else "above"
+    axis = " ".join(name.split("_")[:2])
+    return Finding(
+        f"share of {axis} that is {side} 0",
+        f"unsigned_{name}",
+        0.0,
+        1.0 / math.sqrt(len(values)),
+        0.5,
+        "1",
+        f"{len(values)} samples",
+        "surely wrong",
+        f"comes to 0 time and again and is never {side} it, as the axes beside it are: its sign is lost",
+        field=f"imu.{name}",
+        remedy="log that column with its sign: what was written is an absolute value, or a count without one",
+    )
 
 
 def _finding(name: str, top: float, step: float, count: int, unit: str, most: float | None) -> Finding:

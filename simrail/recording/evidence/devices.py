@@ -49,11 +49,15 @@ def weigh_all(recording: Recording) -> Evidence:
             )
         elif not is_single:
             axes = ()
-    if not are_signs:
-        first, axes = _at_once(first, axes)
     clipped = weigh_clipped(recording)
-    cut = {finding.key.replace("clipped", "alone", 1) for finding in clipped}
-    axes = tuple(_cut(finding) if finding.key in cut else finding for finding in axes)
+    if any(finding.key.startswith("unsigned") for finding in clipped):
+        why = "an axis has lost its sign"
+        first = replace(first, findings=tuple(_together(finding, why) for finding in first.findings))
+        axes = tuple(_together(finding, why) for finding in axes)
+    elif not are_signs:
+        first, axes = _at_once(first, axes)
+    cut = {f"alone_{finding.key.partition('_')[2]}": finding for finding in clipped}
+    axes = tuple(_cut(finding, cut[finding.key]) if finding.key in cut else finding for finding in axes)
     beside = (*axes, *clipped, *weigh_second(recording, first))
     with threadpool_limits(1):  # as for the fits: its matrices are small, too
         beside += weigh_field_clock(recording)
@@ -85,17 +89,18 @@ def _at_once(first: Evidence, axes: tuple[Finding, ...]) -> tuple[Evidence, tupl
     return replace(first, findings=(*findings, mixed)), axes
 
 
-def _together(finding: Finding) -> Finding:
-    """A finding that is wrong together with many others."""
+def _together(finding: Finding, why: str = "several figures are wrong at once") -> Finding:
+    """A finding that is wrong together with many others, or by another one."""
     if not finding.wrong:
         return finding
-    why = "several figures are wrong at once"
     return replace(finding, verdict="could not be judged", why=why, setting="", remedy="")
 
 
-def _cut(finding: Finding) -> Finding:
-    """A finding of an axis that is cut off: its factor follows from that."""
+def _cut(finding: Finding, of: Finding) -> Finding:
+    """A finding of an axis that is cut off, or without its sign: its factor follows from that."""
     why = "the axis is cut off at the end of its range"
+    if of.key.startswith("unsigned"):
+        why = "the axis has lost its sign"
     return replace(finding, rests_on="nothing", verdict="could not be judged", why=why, setting="", remedy="")
 
 

@@ -49,7 +49,7 @@ from simrail.recording.evidence.search import (
 )
 from simrail.recording.evidence.single import WHOLE, WORTH, Single, left_over, weigh_single
 from simrail.recording.evidence.slack import accused, distance, slack_of
-from simrail.recording.evidence.slides import with_slides
+from simrail.recording.evidence.slides import Slide, slides_left, with_slides
 from simrail.recording.evidence.start import drift_by_turns, pace_by_turns
 from simrail.recording.recording import Recording
 
@@ -109,6 +109,9 @@ KINDS = {
 
 OF_GYRO, OF_ACCEL = "imu.gyro.time_offset_s", "imu.accel.time_offset_s"
 """Where the clock of a gyro is set right, and that of an accelerometer."""
+
+OF_WHEEL = ("wheel", "offset", "drift")
+"""What nothing but the push of a wheel tells on a straight line: there a wheel that slides tells nothing."""
 
 ALIKE = ("gyro", "shift")
 """What a gyro that is late may look like on a ride that tells little."""
@@ -181,6 +184,8 @@ def weigh(recording: Recording) -> Evidence:
     }
     rests = {"turn": f"{turn / _DEG:.0f} deg of curves", "push": f"{push:.0f} m/s of changes of speed"}
     slack = slack_of(ride, best)
+    # With a curve, the way beside the slides is known from it.
+    slid = () if has["turn"] else slides_left(ride, best.x)
     findings = []
     for key, kind in KINDS.items():
         sources = [rests[by] for by in kind.by if has[by]]
@@ -194,6 +199,9 @@ def weigh(recording: Recording) -> Evidence:
         if not kind.by:
             sources = ["gravity" + " and curves" * has["turn"]]
         finding = _judged(key, told, slack[key], " and ".join(sources), ride)
+        if slid and finding.wrong and key in OF_WHEEL:
+            findings.append(_beside_slides(finding, slid, ride))
+            continue
         if is_accel and key == "gyro_offset":
             finding = _of_the_accelerometer(finding)
         if best is one and key in ("gyro_offset", "offset", *ALIKE):
@@ -435,6 +443,16 @@ def _beside_a_late_gyro(finding: Finding, two: Fit, slack: float, ride: Ride) ->
         other = f"{_late('gyro', seconds, 'accelerometer')} (this ride does not tell): set {OF_GYRO}"
         finding = replace(finding, remedy="; or ".join(part for part in (finding.remedy, other) if part))
     return finding
+
+
+def _beside_slides(finding: Finding, slides: tuple[Slide, ...], ride: Ride) -> Finding:
+    """A finding that rests on the push of a wheel which slides."""
+    begun, block = float(ride.fine_s[0]), ride.block_s
+    times = " and ".join(
+        f"{begun + block * one.first:.0f} to {begun + block * (one.last + 1):.0f} s" for one in slides
+    )
+    why = f"the wheel spins or slides at {times}, and no curve tells more"
+    return _unjudged(finding.key, math.inf, "nothing", why)
 
 
 def _counted(finding: Finding, ride: Ride) -> Finding:

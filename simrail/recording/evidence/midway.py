@@ -16,7 +16,17 @@ from scipy.linalg import qr
 from simrail.core.jit import FloatArray
 from simrail.recording.evidence.finding import LIKELY, SURE
 from simrail.recording.evidence.fit import Fit, Near, fit, hints, linear
-from simrail.recording.evidence.model import CHANNELS, GAINS, INDEX, LATES, THEN, Ride, start_values
+from simrail.recording.evidence.model import (
+    CHANNELS,
+    FORCE_X,
+    GAINS,
+    INDEX,
+    LATES,
+    THEN,
+    Ride,
+    start_values,
+)
+from simrail.recording.evidence.readings import expected
 from simrail.recording.evidence.search import explains
 from simrail.recording.evidence.single import WHOLE, WORTH, Single, left_over
 from simrail.recording.evidence.slack import accused, distance, slack_of
@@ -47,6 +57,17 @@ TRIED, FEW, ROUGH = 2, 6, 4
 JERK_S = 2.0
 """How long before and after it a change of the wheel shows in its acceleration."""
 
+OTHER_WAY = -2.0
+"""Change of the factor of a wheel whose counter runs the other way from then on: far from any that a fit
+without it takes, of which a ride that has this for half of its time shows none."""
+
+AGREES, BOTH = 0.75, 0.1
+"""Correlation of wheel and push, turned at a moment, from which on a counter has turned its sign; and
+what either side of the moment has of it at least."""
+
+MOST_PUSH_MPS2 = 3.0
+"""An acceleration that no train has."""
+
 STRAINED = 10.0
 """Strain of a fit from which on it is bent; sound rides, and those with one fault, have up to five."""
 
@@ -71,9 +92,12 @@ def change_of(ride: Ride, found: Fit, blamed: int) -> tuple[Ride, Single] | None
     blamed : int
         How many figures it has wrong.
     """
+    turned = _turned(ride)
     looked_at = changes(ride, found)[:TRIED]
     if blamed > 1 or found.strain > STRAINED:
         looked_at += bent(ride, found)
+    if turned is not None:
+        looked_at = [Change(BENT[1], turned, 1.0)]
     told = []
     for change in looked_at:
         other, one = _moved(ride, change, found)
@@ -82,7 +106,7 @@ def change_of(ride: Ride, found: Fit, blamed: int) -> tuple[Ride, Single] | None
         wrong = tuple(name for name in change.group if off[name] > LIKELY)
         if max(off.values()) < SURE or accused(one, slack, WHOLE) or not explains(other, one):
             continue
-        if _left_over(one, wrong, one.noise) < LESS * left_over(found, one.noise):
+        if turned is not None or _left_over(one, wrong, one.noise) < LESS * left_over(found, one.noise):
             told.append((other, one, wrong, change.group))
     if not told:
         return None
@@ -117,9 +141,8 @@ def bent(ride: Ride, found: Fit) -> list[Change]:
     kept = np.setdiff1d(np.arange(len(near.sds)), [near.column(name) for name in WHOLE])
     told = _Left(near, near.rest * near.seen[:, None], found.noise, kept.tolist()).best()[:TRIED]
     for group in BENT:
-        begin = _start(group, found)
         fits = {
-            then: fit(_changing(ride, group, then), begin, free=group, rounds=ROUGH)
+            then: _best_from(_changing(ride, group, then), group, found, ROUGH)
             for then in _moments(count, FEWER)
         }
         told.append(Change(group, min(fits, key=lambda then: fits[then].cost), 1.0))
@@ -141,6 +164,16 @@ def _start(group: tuple[str, ...], found: Fit) -> FloatArray:
         of = THEN[name]
         x[INDEX[name]] = found.value(of) - x[INDEX[of]]
     return x
+
+
+def _starts(group: tuple[str, ...], found: Fit) -> list[FloatArray]:
+    """Values that a change is sought from; of a wheel also those of one that counts the other way then."""
+    starts = [_start(group, found)]
+    if group == BENT[1]:
+        turned = start_values()
+        turned[INDEX[group[0]]] = OTHER_WAY
+        starts.append(turned)
+    return starts
 
 
 def _moments(count: int, most: int) -> list[int]:
@@ -202,7 +235,7 @@ def _moved(ride: Ride, change: Change, before: Fit) -> tuple[Ride, Fit]:
 
     def at(then: int, rounds: int) -> tuple[Ride, Fit]:
         other = _changing(ride, change.group, then)
-        return other, fit(other, _start(change.group, before), free=change.group, rounds=rounds)
+        return other, _best_from(other, change.group, before, rounds)
 
     count = len(ride.measured)
     best = at(change.then, FEW)
@@ -220,6 +253,29 @@ def _moved(ride: Ride, change: Change, before: Fit) -> tuple[Ride, Fit]:
             step //= 2
     assert best[0].then is not None
     return at(best[0].then, 15)
+
+
+def _turned(ride: Ride) -> int | None:
+    """Block from which on a wheel counts the other way, by the accelerometer; None if it does not.
+
+    However a fit without that bends, even out of the map: wheel and push agree up to there, and then with
+    the other sign.
+    """
+    wheel, felt = expected(ride, start_values())[:, FORCE_X], ride.measured[:, FORCE_X]
+    # Where it turns, a wheel seems to jerk as no train does.
+    felt, wheel = felt - np.median(felt), np.where(np.abs(wheel) > MOST_PUSH_MPS2, 0.0, wheel)
+    along = np.cumsum(wheel * felt) / max(float(np.linalg.norm(wheel) * np.linalg.norm(felt)), 1e-12)
+    if len(along) <= 2 * ENDS:
+        return None
+    then = ENDS + int(np.argmax(2.0 * along[ENDS:-ENDS] - along[-1]))
+    parts = along[then], along[then] - along[-1]
+    return then + 1 if sum(parts) > AGREES and min(parts) > BOTH else None
+
+
+def _best_from(ride: Ride, group: tuple[str, ...], before: Fit, rounds: int) -> Fit:
+    """The best fit with a change, of those from all starts."""
+    fits = [fit(ride, begin, free=group, rounds=rounds) for begin in _starts(group, before)]
+    return min(fits, key=lambda one: one.cost)
 
 
 def _moment_s(ride: Ride) -> float:

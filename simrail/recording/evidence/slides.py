@@ -75,6 +75,17 @@ def slides_of(ride: Ride) -> tuple[Slide, ...]:
     return tuple(found)
 
 
+def slides_left(ride: Ride, x: FloatArray) -> tuple[Slide, ...]:
+    """Slides of the wheel that a set of parameters (len(GLOBALS),) does not explain otherwise.
+
+    A clock or a factor that is wrong makes wheel and accelerometer differ at each change of speed, and set
+    right, they agree. Where they differ by as much as before, it is the wheel that slides.
+    """
+    apart = expected(ride, x)[:, FORCE_X] - ride.measured[:, FORCE_X]
+    apart = np.abs(apart - np.median(apart))
+    return tuple(one for one in slides_of(ride) if apart[one.first : one.last + 1].max() > LEAST_MPS2)
+
+
 def _apart(ride: Ride) -> FloatArray:
     """Acceleration of the wheel less that of the accelerometer (b,), whatever factor is between them."""
     wheel, felt = expected(ride, start_values())[:, FORCE_X], ride.measured[:, FORCE_X]

@@ -47,6 +47,9 @@ SLOWEST_HZ, FASTEST_HZ = 1.0, 1e5
 
 SENSORS = ("gyro", "accel")
 
+OTHER_RATE = 10.0
+"""Rate of a file over that of its sheet from which on a note says so: up to there a device has several."""
+
 
 def read_imu(spec: RideFile, reader: SignalReader) -> tuple[pd.DataFrame, float, pd.DataFrame | None]:
     """The IMU at uniform times.
@@ -142,7 +145,7 @@ def _uniform(
     return sampled, rate, gaps if len(gaps) else None
 
 
-def sheet_at(part: ImuSignalPart, folder: Path, rate_hz: float) -> ImuSheet:
+def sheet_at(part: ImuSignalPart, folder: Path, rate_hz: float, notes: list[str]) -> ImuSheet:
     """The sheet at the rate of the file; an increment, a mean up to its stamp, is half an interval old.
 
     Parameters
@@ -153,8 +156,16 @@ def sheet_at(part: ImuSignalPart, folder: Path, rate_hz: float) -> ImuSheet:
         Its folder, which paths of IMU files start from.
     rate_hz : float
         Rate of the file.
+    notes : list of str
+        Is told of a sheet whose own rate is far below that of the file.
     """
-    sheet = replace(_sheet(part, folder), rate_hz=rate_hz)
+    own = _sheet(part, folder)
+    if rate_hz > OTHER_RATE * own.rate_hz:
+        notes.append(
+            f"imu: the sheet of {own.grade} gives {own.rate_hz:g} samples a second, and the file has "
+            f"{rate_hz:.6g}: mind the unit of its rate_hz, or it is the sheet of another device"
+        )
+    sheet = replace(own, rate_hz=rate_hz)
     return replace(sheet, lag_s=max(sheet.lag_s, 0.5 / rate_hz)) if part.increments else sheet
 
 

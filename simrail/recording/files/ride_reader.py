@@ -103,7 +103,7 @@ def _recording(spec: RideFile, reader: SignalReader) -> Recording:
     recording = Recording(
         name=spec.name,
         imu=imu,
-        imu_sheet=sheet_at(spec.imu, folder, rate_hz),
+        imu_sheet=sheet_at(spec.imu, folder, rate_hz, reader.notes),
         mount=spec.imu.name,
         mount_body=spec.imu.body,
         mount_position_m=spec.imu.position_m,

@@ -58,6 +58,9 @@ _USUAL = (
 USUAL = {FIGURES[usual.key].field: usual for usual in _USUAL}
 """By the field of a grade."""
 
+LEAST_RATE_HZ = 4.0
+"""No inertial sensor is sold that gives fewer samples than this a second: a rate of 1 was meant in kHz."""
+
 _NAMES = {"gyro": "gyro", "accel": "accelerometer"}
 
 
@@ -109,11 +112,16 @@ def sheet_warnings(grade: ImuGrade) -> tuple[str, ...]:
 
 
 def unusual_figures(grade: ImuGrade) -> tuple[str, ...]:
-    """Warnings, a line each, of figures of a grade that no sensor on the market has.
+    """Warnings, a line each, of figures and a rate of a grade that no sensor on the market has.
 
     Of the noise of a sample and the size of a count also those that are too large a share of the range.
     """
     told = []
+    if grade.rate_hz < LEAST_RATE_HZ:
+        told.append(
+            f"IMU {grade.name}: a rate of {grade.rate_hz:g} Hz is that of no IMU that is sold: mind the unit "
+            f"({grade.rate_hz:g} kHz is rate_hz = {1e3 * grade.rate_hz:g})"
+        )
     for field, usual in USUAL.items():
         value = getattr(grade, field) / FIGURES[usual.key].si
         if value > 0.0 and not math.isinf(value) and not usual.least <= value <= usual.most:

@@ -115,5 +115,13 @@ def test_an_increment_is_the_mean_of_the_interval_before_its_stamp(tmp_path):
     sheet = ImuSheet("mine", 100.0, 0.002, *([1e-3] * 6))
     for increments, lag_s, wanted in ((("gyro",), 0.002, 0.01), (("gyro",), 0.03, 0.03), ((), 0.002, 0.002)):
         part = SimpleNamespace(sheet=replace(sheet, lag_s=lag_s), increments=increments)
-        found = sheet_at(part, tmp_path, 50.0)
+        found = sheet_at(part, tmp_path, 50.0, [])
         assert (found.rate_hz, found.lag_s) == (50.0, pytest.approx(wanted, rel=1e-12))
+
+
+def test_a_sheet_whose_rate_is_far_below_that_of_the_file_is_noted(tmp_path):
+    for rate, count in ((1.0, 1), (250.0, 0)):
+        notes: list[str] = []
+        part = SimpleNamespace(sheet=ImuSheet("mine", rate, 0.0, *([1e-3] * 6)), increments=())
+        assert sheet_at(part, tmp_path, 1000.0, notes).rate_hz == 1000.0
+        assert len(notes) == count and all("mine gives 1 samples a second" in note for note in notes)

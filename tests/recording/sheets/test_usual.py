@@ -42,6 +42,12 @@ def test_what_is_only_unlikely_is_warned_of() -> None:
     assert len(told) == 1 and "accelerometer" in told[0]
 
 
+def test_a_rate_in_khz_is_warned_of() -> None:
+    (told,) = unusual_figures(ImuGrade.from_datasheet("mine", 1.0))
+    assert "1 Hz" in told and "rate_hz = 1000" in told
+    assert unusual_figures(ImuGrade.from_datasheet("mine", 10.0)) == ()
+
+
 def test_noise_and_counts_are_held_against_the_range() -> None:
     """0.09 deg/s/sqrt(Hz) at 1 kHz is 2.8 deg/s a sample: 9 % of 30 deg/s."""
     grade = ImuGrade.from_datasheet(
