@@ -28,6 +28,7 @@ PATTERNS = {
     "simrail export SCENARIO --format mcap --out rides": "tests/campaign export and read one",
     "python results/reference/bounds.py DIR ...": "of the results of an hour",
     "simrail run which_imu --out DIR": "half an hour; it is read with its settings",
+    "python results/reference/greatest.py DIR": "of the results of an hour",
     "python results/reference/which_imu.py DIR": "of the results of half an hour",
     "simrail estimate RIDE.toml --estimator ZeroVelocityOdometry --set smoothed=true": "my_ride.toml is",
 }
