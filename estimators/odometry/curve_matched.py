@@ -278,7 +278,8 @@ class CurveMatchedOdometry:
         n = len(time) // block
         names = [GYRO[1], GYRO[2], ACCEL[0], ACCEL[1]]
         signals = recording.imu[names].to_numpy(dtype=np.float64)[: n * block]
-        signals = signals.reshape(n, block, 4).mean(axis=1)
+        # Rows of a frame may lie by columns, for which the kernel would be compiled anew.
+        signals = np.ascontiguousarray(signals.reshape(n, block, 4).mean(axis=1))
         ends = np.array(time[block - 1 :: block][:n])  # a view would be compiled for anew
         counts, pulse = counts_at(recording, ends)
         chord = chord_of(recording)

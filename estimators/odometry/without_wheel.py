@@ -112,7 +112,7 @@ def steps_without_wheel(
     dt = trace.model.step_s
     steps = Steps(
         rate_hz=1.0 / dt,
-        time_s=trace.time_s,
+        time_s=np.array(trace.time_s),  # a view that is read only would be compiled for anew
         states=np.empty((n, STATES)),
         covariance=np.empty((n, spoken_of, spoken_of)),
         acceleration=trace.found.acceleration,

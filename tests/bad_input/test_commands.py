@@ -122,6 +122,7 @@ def test_own_estimator_that_cannot_be_imported(place: Path, message_of: Callable
     assert "no such estimator class; found 'Mine'" in message_of(["run", "mine.toml"])
 
 
+@pytest.mark.long
 def test_as_a_process(place: Path) -> None:
     (place / "mine.toml").write_text(GOOD.replace("speed_kmh = 50.0", "speed_kmh = -50.0"))
     done = subprocess.run(

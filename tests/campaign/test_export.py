@@ -59,6 +59,7 @@ def assert_same(a: Recording, b: Recording) -> None:
     assert repr(asdict(bare[0])) == repr(asdict(bare[1]))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("form", ["csv", "parquet"])
 def test_exported_rides_read_back_bit_by_bit(
     here: Path, form: str, capsys: pytest.CaptureFixture[str]

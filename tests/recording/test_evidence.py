@@ -78,6 +78,7 @@ def test_of_three_clocks_the_accelerometers_is_told_where_the_others_agree(
     assert evidence.of("offset").verdict == evidence.of("gyro").verdict == "sound"
 
 
+@pytest.mark.long
 def test_a_late_gyro_and_a_late_encoder_are_told_apart(sound: Recording) -> None:
     evidence = weigh(PLANTS["gyro_offset"](PLANTS["offset"](sound, -0.5), 1.0))
     found = {finding.key: finding.value for finding in evidence.wrong}

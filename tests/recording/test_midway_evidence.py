@@ -66,6 +66,7 @@ def test_a_change_is_told_with_its_size_and_its_moment(
     assert "cut the recording" in found.remedy
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("share", [0.5, pytest.param(0.35, marks=LONG)])
 def test_a_counter_that_turns_its_sign_is_told_with_the_moment(share: float, sound: Recording) -> None:
     evidence = weigh_all(counted_otherwise(sound, -1.0, share))

@@ -167,6 +167,7 @@ def test_a_gyro_that_is_turned_against_its_accelerometer_is_told_and_mended(
     np.testing.assert_allclose(read.imu, back.imu, atol=1e-4)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("columns", "key"),
     [

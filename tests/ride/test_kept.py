@@ -121,6 +121,7 @@ def test_wheel_angles_do_not_feel_where_segments_end(tmp_path: Path) -> None:
     np.testing.assert_allclose(angles[1], angles[0], rtol=0, atol=1e-12 * np.abs(angles[0]).max())
 
 
+@pytest.mark.long
 def test_a_long_ride_that_shakes_is_that_of_the_whole(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:

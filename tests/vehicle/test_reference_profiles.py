@@ -66,6 +66,7 @@ def test_equivalent_conicity_of_the_standard(kind):
         assert (0.5 * np.pi / quarter) ** 2 == pytest.approx(expected, abs=0.004)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", ["A", pytest.param("B", marks=pytest.mark.slow)])
 def test_our_conicity_is_within_the_standards_tolerance(kind):
     """Elastic at 10 kN, hardly smoothed, and with the axle's roll: within half of Annex K's tolerance."""

@@ -489,6 +489,7 @@ def test_acceleration_says_how_much_it_shakes():
         assert rms(error) > 0.1
 
 
+@pytest.mark.long
 def test_a_wrong_map_is_paid_for_by_its_own_sd():
     """A curve of another radius and joints half a metre off: with their sizes known the place stays inside
     its interval; told that the map is exact, it does not."""

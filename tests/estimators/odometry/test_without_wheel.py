@@ -112,6 +112,7 @@ def integrated(reckoned: Reckoned, first: FloatArray, dt: float) -> FloatArray:
     return out
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("smoothed", [False, True])
 def test_the_way_errs_as_the_zero_velocity_odometry_says(
     ridden: Callable, follow: Callable, smoothed: bool

@@ -99,6 +99,7 @@ def test_exact_motion_gives_exact_speed(exactly: Callable, bend: Callable) -> No
 SEEDS = [1, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(2, 7))]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", SEEDS)
 def test_speed_and_way_hold_what_they_say(ridden: Callable, follow: Callable, seed: int) -> None:
     """Two devices: speed .1 m/s smoothed and .9 causal, way .4 %, and no stop but the true ones.
@@ -132,6 +133,7 @@ def test_speed_and_way_hold_what_they_say(ridden: Callable, follow: Callable, se
         assert np.sqrt((off[runs] ** 2).mean()) > 0.3 * np.sqrt((sd[runs] ** 2).mean())
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", SEEDS)
 def test_neither_crawling_nor_gentle_braking_is_a_stop(ridden: Callable, follow: Callable, seed: int) -> None:
     """1 and .7 m/s for half a minute, .1 m/s2: as quiet as at rest, since nothing vibrates in this ride."""

@@ -189,6 +189,7 @@ def test_recovery_would_notice_a_wrong_likelihood(fault: str, monkeypatch: pytes
     assert min(slope) <= 0.0
 
 
+@pytest.mark.long
 def test_the_true_noise_is_a_minimum_along_every_axis() -> None:
     """Twice and half of each value are less likely, by more than chance lets a true value lose."""
     goal = synthetic()

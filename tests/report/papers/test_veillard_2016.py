@@ -389,6 +389,7 @@ def test_the_curve_that_is_drawn_is_that_which_leans() -> None:
     assert sharpest(example()) == (1650.0, 1850.0)
 
 
+@pytest.mark.long
 def test_the_section_is_written() -> None:
     scenario = load_scenario("imu_only")
     names = {part: name for name, part in ((m.name, m.part.stands_for) for m in methods(scenario))}
