@@ -80,7 +80,7 @@ from simrail.estimators.odometry.kernel import (
     curve_matched,
     room_to_work,
 )
-from simrail.estimators.odometry.line_table import line_at, line_table
+from simrail.estimators.odometry.line_table import line_at, line_under
 from simrail.estimators.odometry.moving_start import (
     BACK_S,
     Start,
@@ -96,11 +96,9 @@ from simrail.estimators.odometry.pointing import (
     lag_of,
     place_sd_of,
     pointing_of,
-    section_of,
     sway_sd_of,
     turn_of,
 )
-from simrail.estimators.odometry.scale import scale_of
 from simrail.estimators.odometry.without_wheel import steps_without_wheel
 
 from simrail.core.columns import ACCEL, GYRO, ODOMETRY, ODOMETRY_SD
@@ -283,14 +281,8 @@ class CurveMatchedOdometry:
         ends = np.array(time[block - 1 :: block][:n])  # a view would be compiled for anew
         counts, pulse = counts_at(recording, ends)
         chord = chord_of(recording)
-        grid, table = line_table(
-            recording.track,
-            chord=chord,
-            section=section_of(recording),
-            mount_x_m=recording.mount_position_m[0],
-            wheel_ahead_m=wheel_ahead(recording),
-        )
-        pointing = pointing_of(recording, chord).at_scale(scale_of(recording))
+        grid, table = line_under(recording, wheel_ahead_m=wheel_ahead(recording))
+        pointing = pointing_of(recording, chord)
         x, p = self._start(recording, pulse, chord, pointing, start)
         x[YAW] = line_at(grid, table, x[S]).heading
         spoken_of = STATES if self.smoothed else V + 1
@@ -311,7 +303,7 @@ class CurveMatchedOdometry:
     def _without_wheel(self, recording: Recording) -> Steps:
         """The steps of the filter that has the zero-velocity odometry in place of a wheel."""
         chord = chord_of(recording)
-        pointing = pointing_of(recording, chord).at_scale(scale_of(recording))
+        pointing = pointing_of(recording, chord)
         x, p = self._start(recording, 0.0, chord, pointing)
         return steps_without_wheel(
             recording, x, p, self._model(recording, 0.0, pointing), smoothed=self.smoothed

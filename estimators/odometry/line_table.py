@@ -30,8 +30,10 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
+from simrail.estimators.odometry.pointing import chord_of, section_of
 
 from simrail.core.jit import FloatArray, njit_borrowed
+from simrail.recording.recording import Recording
 from simrail.recording.sheets.vehicle_sheet import Chord
 from simrail.track.alignment import element_starts
 from simrail.track.design import Curve, Straight, TrackDesign, TrackFrame
@@ -198,6 +200,17 @@ def line_table(
     rows = [heading, bend, even, odd, frame.roll_rad, pitch, at_wheel, askew, element, curve]
     return np.array([track.start_m, PLACES_PER_M]), np.ascontiguousarray(
         np.column_stack(rows), dtype=np.float64
+    )
+
+
+def line_under(recording: Recording, *, wheel_ahead_m: float = 0.0) -> tuple[FloatArray, FloatArray]:
+    """`line_table` of a recording's map, for its mount."""
+    return line_table(
+        recording.track,
+        chord=chord_of(recording),
+        section=section_of(recording),
+        mount_x_m=recording.mount_position_m[0],
+        wheel_ahead_m=wheel_ahead_m,
     )
 
 

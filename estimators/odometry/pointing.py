@@ -7,6 +7,7 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from simrail.estimators.odometry.scale import scale_of
 
 from simrail.core.jit import FloatArray
 from simrail.recording.recording import Recording
@@ -157,6 +158,11 @@ def section_of(recording: Recording) -> Chord | None:
 
 def pointing_of(recording: Recording, chord: Chord | None) -> Pointing:
     """What is known of the yaw of the mount's body in the track."""
+    return kind_of(recording, chord).at_scale(scale_of(recording))
+
+
+def kind_of(recording: Recording, chord: Chord | None) -> Pointing:
+    """Which of the seven it is, at full size."""
     if recording.vehicle_sheet is None or chord is None:
         return UNKNOWN_BODY
     rests_on = {body.name: body.supports for body in recording.vehicle_sheet.bodies}

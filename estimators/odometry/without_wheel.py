@@ -50,8 +50,7 @@ from simrail.estimators.odometry.kernel import (
     V,
     room_to_work,
 )
-from simrail.estimators.odometry.line_table import line_at, line_table
-from simrail.estimators.odometry.pointing import chord_of, section_of
+from simrail.estimators.odometry.line_table import line_at, line_under
 from simrail.estimators.odometry.without_wheel_kernel import (
     BUMP,
     GRADE,
@@ -100,12 +99,7 @@ def steps_without_wheel(
     trace = ZeroVelocityOdometry(smoothed=smoothed).trace(recording, remembering=True)
     reckoned, first = reckoned_of(trace, recording, smoothed=smoothed)
     n, gravity = len(trace.time_s), recording.gravity_mps2
-    grid, table = line_table(
-        recording.track,
-        chord=chord_of(recording),
-        section=section_of(recording),
-        mount_x_m=recording.mount_position_m[0],
-    )
+    grid, table = line_under(recording)
     x, p = _begin(recording, x, p, first)
     x[YAW] = line_at(grid, table, x[S]).heading
     spoken_of = STATES if smoothed else V + 1

@@ -14,8 +14,8 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 from scipy import ndimage
-from simrail.estimators.odometry.line_table import PLACES_PER_M, line_table
-from simrail.estimators.odometry.pointing import chord_of, section_of
+from simrail.estimators.odometry.line_table import PLACES_PER_M, line_under
+from simrail.estimators.odometry.pointing import chord_of
 from simrail.estimators.odometry.scale import scale_of
 from simrail.estimators.track_relative.dual import Dual, Vector
 from simrail.estimators.track_relative.states import S
@@ -81,12 +81,7 @@ class Lines(NamedTuple):
 def lines_of(recording: Recording) -> Lines:
     """The map of a recording, for its mount."""
     track = recording.track
-    _, table = line_table(
-        track,
-        chord=chord_of(recording),
-        section=section_of(recording),
-        mount_x_m=recording.mount_position_m[0],
-    )
+    _, table = line_under(recording)
     heading_askew, even, odd, pitch, curve = table[:, 7], table[:, 2], table[:, 3], table[:, 5], table[:, 9]
     places = np.minimum(track.start_m + np.arange(len(table)) / PLACES_PER_M, track.end_m)
     under = track.frame(places)

@@ -264,8 +264,7 @@ def _flows(course: Course, ground: Ground, rows: slice) -> FloatArray:
     out[:, 5], out[:, 6] = np.maximum(flank, 0.0), np.maximum(-flank, 0.0)
     element, curve, vertical = numbers_at(course.lines, np.concatenate([[before], place[rows]]))
     slips = course.steps.slipping[rows]
-    walk_m = CurveMatchedOdometry().at_scale(scale).wheel_walk_m
-    out[:, 12] = np.where(slips, LOST_M**2, walk_m * np.abs(way))
+    out[:, 12] = np.where(slips, LOST_M**2, CurveMatchedOdometry().wheel_walk_m * np.abs(way))
     if not course.around.in_time:
         out[:, 13] = np.exp(-np.abs(way) / course.around.slow_m)
     out[:, 7] = np.where(vertical[1:] > 0.0, np.exp(-np.abs(way) / (scale * VERTICAL_LENGTH_M)), 1.0)

@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
-from simrail.estimators.odometry.pointing import OTHER_BODY, chord_of, pointing_of, section_of
+from simrail.estimators.odometry.pointing import OTHER_BODY, chord_of, kind_of, section_of
 from simrail.estimators.odometry.scale import scale_of
 
 from simrail.core.errors import InputError, did_you_mean
@@ -273,7 +273,7 @@ def class_of(recording: Recording) -> Motion:
         return WAGON
     if not here.supports:
         return AXLE
-    if pointing_of(recording, chord_of(recording)) is OTHER_BODY:
+    if kind_of(recording, chord_of(recording)) is OTHER_BODY:
         return LONE if section_of(recording) is None else JOINTED
     below = [sheet.body(support.on) for support in here.supports]
     on_axles = all(body is None or not body.supports for body in below)

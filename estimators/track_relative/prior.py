@@ -91,7 +91,7 @@ def noise_of(recording: Recording, motion: Motion, without: Collection[str] = ()
         jerk=JERK_M2PS5,
         tread_sd=method.tread_sd * rolling_share(recording),
         tread_length=method.tread_length_m,
-        lag_walk=0.0 if "lag" in without else pointing.at_scale(scale).lag_walk_m,
+        lag_walk=0.0 if "lag" in without else pointing.lag_walk_m,
         gyro_walk=0.0 if "gyro_bias" in without else _walk(sheet, "gyro"),
         accel_walk=0.0 if "accel_bias" in without else _walk(sheet, "accel"),
         forgotten_sd=np.array([kept["slope"], kept["curve"], kept["cant"], kept["joints"], kept["joints"]]),
@@ -172,7 +172,7 @@ def _train_sds(sd: FloatArray, recording: Recording, motion: Motion) -> None:
     """Place, wheel, heading, and how the body follows cant, curves and traction."""
     errors, wheel, scale = recording.map_errors, recording.encoder_sheet, scale_of(recording)
     method, chord = CurveMatchedOdometry().at_scale(scale), chord_of(recording)
-    pointing = pointing_of(recording, chord).at_scale(scale)
+    pointing = pointing_of(recording, chord)
     sd[at.S] = math.hypot(method.start_sd_m, chainage_sd(recording, recording.start_position_m))
     speed, speed_sd = first_speed(recording)
     sd[at.V], sd[at.A] = speed_sd, 1e-2 if speed == 0.0 else ACCELERATION_SD_MPS2
