@@ -62,7 +62,7 @@ def room_for_history(steps: int, n: int, m: int) -> History:
 def keep(states: FloatArray, covariances: FloatArray, k: int, x: FloatArray, p: FloatArray) -> None:
     """Write state and covariance of step k into rows k; the covariance of as many states as it has room for.
 
-    By elements: numba compiles the assignment of a whole array for half a second, wherever it stands.
+    By elements: what numba makes of the assignment of a whole array takes seconds to compile in each process.
     """
     for i in range(x.shape[0]):
         states[k, i] = x[i]
@@ -255,6 +255,45 @@ def block_update(
 
 
 @njit_borrowed
+def row_product(a: FloatArray, b: FloatArray, out: FloatArray) -> None:
+    """Out (k,) = a B of a row a (n,), most of whose entries may be zero, and B (n, k)."""
+    for c in range(out.shape[0]):
+        out[c] = 0.0
+    for i in range(a.shape[0]):
+        if a[i] != 0.0:
+            for c in range(out.shape[0]):
+                out[c] += a[i] * b[i, c]
+
+
+@njit_borrowed
+def product(a: FloatArray, b: FloatArray, out: FloatArray) -> None:
+    """Out (m, k) = A B of A (m, n), most of whose entries may be zero, and B (n, k).
+
+    In place of numpy's, which asks for memory at every call and compiles for seconds.
+    """
+    for i in range(out.shape[0]):
+        for c in range(out.shape[1]):
+            out[i, c] = 0.0
+        for j in range(a.shape[1]):
+            if a[i, j] != 0.0:
+                for c in range(out.shape[1]):
+                    out[i, c] += a[i, j] * b[j, c]
+
+
+@njit_borrowed
+def product_of_transposed(a: FloatArray, b: FloatArray, out: FloatArray) -> None:
+    """Out (m, k) = A' B of A (n, m), most of whose entries may be zero, and B (n, k)."""
+    for i in range(out.shape[0]):
+        for c in range(out.shape[1]):
+            out[i, c] = 0.0
+    for j in range(a.shape[0]):
+        for i in range(out.shape[0]):
+            if a[j, i] != 0.0:
+                for c in range(out.shape[1]):
+                    out[i, c] += a[j, i] * b[j, c]
+
+
+@njit_borrowed
 def log_density(squares: float, product: float, count: int) -> float:
     """Log-likelihood of ``count`` measurements: -(sum of e^2/s + ln product of s + count ln 2 pi)/2.
 
@@ -324,14 +363,25 @@ def fixed_interval(past: History, states: FloatArray, covariances: FloatArray) -
     states, covariances : ndarray (k, n), (k, n, n), out
     """
     steps, n = past.states.shape
-    lam, info = np.zeros(n), np.zeros((n, n))
+    lam, info, v = np.zeros(n), np.zeros((n, n)), np.zeros(n)
+    work, shrunk = np.zeros((n, n)), np.zeros((n, n))
     for k in range(steps - 1, -1, -1):
         for m in range(past.rows.shape[1] - 1, -1, -1):
             if past.inverses[k, m] > 0.0:
                 h, gain = past.rows[k, m], past.gains[k, m]
                 withdraw(lam, h, gain, past.errors[k, m])
-                withdraw_information(info, h, gain, past.inverses[k, m], gain @ info)
+                row_product(gain, info, v)
+                withdraw_information(info, h, gain, past.inverses[k, m], v)
         p, f = past.covariances[k], past.transitions[k]
-        states[k] = past.states[k] - p @ lam
-        covariances[k] = p - p @ info @ p
-        lam, info = f.T @ lam, f.T @ info @ f
+        row_product(lam, p, v)
+        product(p, info, work)
+        product(work, p, shrunk)
+        for i in range(n):
+            states[k, i] = past.states[k, i] - v[i]
+            for c in range(n):
+                covariances[k, i, c] = p[i, c] - shrunk[i, c]
+        row_product(lam, f, v)
+        product(info, f, work)
+        product_of_transposed(f, work, info)
+        for i in range(n):
+            lam[i] = v[i]

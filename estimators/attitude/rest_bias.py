@@ -84,8 +84,9 @@ def rest_bias(recording: Recording, *, enabled: bool = True, with_variance: bool
     if not enabled:
         return RestBias(np.zeros((n, 3)), np.zeros(n), spread)
     found = RestBias(np.empty((n, 3)), np.empty(n), spread)
-    times = recording.imu.index.to_numpy(dtype=np.float64)
-    moves, guard = motion_times(recording), guard_s(recording)
+    # Arrays of one kind: for each other one, as some that may only be read, the kernel is compiled for anew.
+    times, moves = np.array(recording.imu.index, dtype=np.float64), np.array(motion_times(recording))
+    guard = guard_s(recording)
     average_rests(
         running_sums(*rows_of(recording.imu, GYRO)),
         times,

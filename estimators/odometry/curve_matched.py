@@ -289,14 +289,14 @@ class CurveMatchedOdometry:
         states, covariance = np.empty((n, STATES)), np.empty((n, spoken_of, spoken_of))
         rate = sheet.rate_hz / block
         steps = Steps(rate, ends, states, covariance, np.empty(n), *np.empty((2, n), bool))
-        past = room_for_history(n, STATES, UPDATES) if self.smoothed else None
+        past = room_for_history(n if self.smoothed else 0, STATES, UPDATES)
         if jitter_m2 is None:
             begun = not self.causal and start_of(recording).speed_mps != 0.0
             jitter_m2 = jitter_of(None, recording) if begun else 0.0
         model = self._model(recording, pulse, pointing)._replace(jitter_m2=jitter_m2)
         dt, gravity = block / sheet.rate_hz, recording.gravity_mps2
         curve_matched(dt, signals, counts, model, gravity, grid, table, x, p, steps, room_to_work(), past)
-        if past is not None:
+        if self.smoothed:
             fixed_interval(past, steps.states, steps.covariance)
         return steps
 

@@ -270,6 +270,15 @@ def ahead(x: FloatArray, p: FloatArray, lead: float, intensity: float, out: Floa
 
 
 @njit_inline
+def _take(x: FloatArray, p: FloatArray, mean: FloatArray, covariance: FloatArray) -> None:
+    """X and P from a mean and a covariance, by elements (`simrail.estimators.kalman.keep` says why)."""
+    for i in range(x.shape[0]):
+        x[i] = mean[i]
+        for j in range(x.shape[0]):
+            p[i, j] = covariance[i, j]
+
+
+@njit_inline
 def _begin(p: FloatArray, q: float, speed_sd: float) -> None:
     """Covariance of a train at speed before any reading has been followed, in place."""
     p[:, :] = 0.0
@@ -371,8 +380,7 @@ def _filter(
             _begin(p, q, SPEED_SD_MPS)
         if k == shown:
             resting = False
-            x[:] = anew
-            p[:, :] = anew_p
+            _take(x, p, anew, anew_p)
         if resting:
             _stand(x, p, q, max(idle, 1e-3), start_speed, start_acceleration)
         until = time[k + 1] if k + 1 < len(time) else np.inf

@@ -337,7 +337,7 @@ def curve_matched(
     p: FloatArray,
     steps: Steps,
     scratch: Scratch,
-    past: History | None,
+    past: History,
 ) -> None:
     """Run the filter over n steps.
 
@@ -362,11 +362,11 @@ def curve_matched(
         Of n rows.
     scratch : Scratch
         All zero.
-    past : History or None, output
-        For `simrail.estimators.kalman.fixed_interval`; None where no smoother follows.
+    past : History, output
+        For `simrail.estimators.kalman.fixed_interval`; of no steps where no smoother follows.
     """
     f, work, h, gain, v = scratch
-    pulse = model.pulse_m
+    pulse, keeps = model.pulse_m, past.states.shape[0] > 0
     h[WHEEL, WAY] = h[HEADING, YAW] = h[REST, V] = 1.0
     h[HEADING, SWAY] = -1.0
     direction = idle = moving = agreed = wheel_speed = steady = 0.0
@@ -415,7 +415,7 @@ def curve_matched(
         if slipping:
             start_anew(x, p, f, measured, pulse)
         resting = resting or (idle > model.still_s and abs(x[V]) * idle < 2.0 * pulse)
-        if past is not None:
+        if keeps:
             remember_prediction(past, k, x, p, f)
 
         for m in range(UPDATES):
@@ -430,7 +430,7 @@ def curve_matched(
                 error, variance, wanted = -x[V], REST_VARIANCE, resting
             if wanted:
                 s = update(x, p, h[m], error, variance, gain, v)
-                if past is not None:
+                if keeps:
                     remember(past, k, m, h[m], gain, error, s)
         keep(steps.states, steps.covariance, k, x, p)
         steps.slipping[k], steps.resting[k] = slipping, resting

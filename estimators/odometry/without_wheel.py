@@ -113,7 +113,7 @@ def steps_without_wheel(
         slipping=np.ones(n, dtype=bool),
         resting=reckoned.rests > 0.0,
     )
-    past = room_for_history(n, STATES, ROWS) if smoothed else None
+    past = room_for_history(n if smoothed else 0, STATES, ROWS)
     slopes = SlopeModel(
         bump_sd_rad=BUMP_SD_RAD,
         bump_length_m=BUMP_LENGTH_M,
@@ -122,14 +122,13 @@ def steps_without_wheel(
         slope_sd_rad=SLOPE_SD_RAD,
     )
     without_wheel(dt, reckoned, model, slopes, gravity, grid, table, x, p, steps, room_to_work(STATES), past)
-    if past is not None:
+    if smoothed:
         fixed_interval(past, steps.states, steps.covariance)
     return steps
 
 
 def reckoned_of(trace: Trace, recording: Recording, *, smoothed: bool) -> tuple[Reckoned, FloatArray]:
     """What the zero-velocity odometry says, how that errs, and the covariance (3, 3) of its first error."""
-    assert trace.past is not None
     states, n = trace.found.states, len(trace.time_s)
     roll, pitch, gravity = states[:, ROLL], states[:, PITCH], recording.gravity_mps2
     rates = trace.model.signals[:, 1:3] - states[:, [DRIFT_Y, DRIFT_Z]]

@@ -11,8 +11,11 @@ from simrail.estimators.kalman import (
     History,
     congruence,
     keep,
+    product,
+    product_of_transposed,
     remember,
     remember_prediction,
+    row_product,
     update,
     withdraw_information,
 )
@@ -130,29 +133,52 @@ def neighbours(
     before, crossed, after : ndarray (k, m, m), out
         cov(e(k-1), e(k-1)), cov(e(k-1), e(k)), cov(e(k), e(k)); of the first step ``after`` alone.
     """
-    steps, n = past.states.shape
-    info, carried = np.zeros((n, n)), np.zeros((n, len(picked)))
+    (steps, n), m = past.states.shape, len(picked)
+    info, carried, kept = np.zeros((n, n)), np.zeros((n, m)), np.zeros((n, m))
+    filtered, work, v = np.zeros((n, n)), np.zeros((n, n)), np.zeros(n)
+    across, lost, turned = np.zeros((m, n)), np.zeros((m, n)), np.ascontiguousarray(picked.T)
     for k in range(steps - 1, -1, -1):
         predicted = past.covariances[k]
-        filtered = predicted.copy()
-        for m in range(past.rows.shape[1]):
-            if past.inverses[k, m] > 0.0:
-                v = filtered @ past.rows[k, m]
-                for i in range(n):
-                    for c in range(n):
-                        filtered[i, c] -= past.gains[k, m, i] * v[c]
+        _updated(past, k, filtered, v)
+        product(picked, filtered, across)
         if k < steps - 1:
-            crossed[k + 1] = picked @ filtered @ carried
-        for m in range(past.rows.shape[1] - 1, -1, -1):
-            if smoothed and past.inverses[k, m] > 0.0:
-                gain = past.gains[k, m]
-                withdraw_information(info, past.rows[k, m], gain, past.inverses[k, m], gain @ info)
-        kept = picked.T - info @ predicted @ picked.T
-        after[k] = picked @ predicted @ kept
-        if k < steps - 1:
-            before[k + 1] = after[k] if smoothed else picked @ filtered @ picked.T
-        carried = past.transitions[k].T @ kept
-        info = past.transitions[k].T @ info @ past.transitions[k]
+            product(across, carried, crossed[k + 1])
+            if not smoothed:
+                product(across, turned, before[k + 1])
+        for row in range(past.rows.shape[1] - 1, -1, -1):
+            if smoothed and past.inverses[k, row] > 0.0:
+                gain = past.gains[k, row]
+                row_product(gain, info, v)
+                withdraw_information(info, past.rows[k, row], gain, past.inverses[k, row], v)
+        product(picked, predicted, across)
+        product(across, info, lost)  # its transpose is Lam P^- T'
+        for i in range(n):
+            for c in range(m):
+                kept[i, c] = turned[i, c] - lost[c, i]
+        product(across, kept, after[k])
+        if k < steps - 1 and smoothed:
+            for i in range(m):
+                for c in range(m):
+                    before[k + 1, i, c] = after[k, i, c]
+        f = past.transitions[k]
+        product_of_transposed(f, kept, carried)
+        product(info, f, work)
+        product_of_transposed(f, work, info)
+
+
+@njit_borrowed
+def _updated(past: History, k: int, p: FloatArray, v: FloatArray) -> None:
+    """P (n, n) after the updates of step k; ``v`` (n,) is for work."""
+    n = p.shape[0]
+    for i in range(n):
+        for c in range(n):
+            p[i, c] = past.covariances[k, i, c]
+    for m in range(past.rows.shape[1]):
+        if past.inverses[k, m] > 0.0:
+            row_product(past.rows[k, m], p, v)
+            for i in range(n):
+                for c in range(n):
+                    p[i, c] -= past.gains[k, m, i] * v[c]
 
 
 @njit_borrowed
@@ -266,7 +292,7 @@ def without_wheel(
     p: FloatArray,
     steps: Steps,
     scratch: Scratch,
-    past: History | None,
+    past: History,
 ) -> None:
     """Run the filter over n steps.
 
@@ -287,10 +313,11 @@ def without_wheel(
         Of n rows: states and covariances.
     scratch : Scratch
         All zero.
-    past : History or None, output
-        For `simrail.estimators.kalman.fixed_interval`; None where no smoother follows.
+    past : History, output
+        For `simrail.estimators.kalman.fixed_interval`; of no steps where no smoother follows.
     """
     f, work, h, gain, v = scratch
+    keeps = past.states.shape[0] > 0
     h[HEADING, YAW] = h[SLOPE, TILT] = h[REST, V] = 1.0
     h[SLOPE, OFFSET] = 1.0 / gravity
     h[HEADING, SWAY] = h[SLOPE, LEVEL] = h[SLOPE, BUMP] = h[SLOPE, GRADE] = -1.0
@@ -303,7 +330,7 @@ def without_wheel(
         before = here
         if abs(x[V]) > DIRECTION_SPEED_MPS or direction == 0.0:
             direction = np.sign(x[V])
-        if past is not None:
+        if keeps:
             remember_prediction(past, k, x, p, f)
         for m in range(ROWS):
             if m == REST and (reckoned.rests[k] == 0.0 or reckoned.rest_variance == np.inf):
@@ -324,6 +351,6 @@ def without_wheel(
                 error -= reckoned.pitch[k] + x[TILT] + x[OFFSET] / gravity
                 variance += slopes.slope_sd_rad**2
             s = update(x, p, h[m], error, variance, gain, v)
-            if past is not None:
+            if keeps:
                 remember(past, k, m, h[m], gain, error, s)
         keep(steps.states, steps.covariance, k, x, p)

@@ -101,8 +101,8 @@ class Trace(NamedTuple):
         What went in.
     found : Found
         What came out, smoothed if that is wanted.
-    past : History or None
-        What the filter left behind for the smoother.
+    past : History
+        What the filter left behind for the smoother; of no steps if that is not wanted.
     heard : Heard or None
         What came of the searches for the delay of a second IMU.
     last : ndarray (m, m) or None
@@ -112,7 +112,7 @@ class Trace(NamedTuple):
     time_s: FloatArray
     model: Model
     found: Found
-    past: History | None
+    past: History
     heard: Heard | None = None
     last: FloatArray | None = None
 
@@ -225,12 +225,12 @@ class ZeroVelocityOdometry:
             )
             updates, heard = ECHO_UPDATES, room_to_hear(steps)
         found = room(steps, len(x) if self.smoothed else PITCH + 1, len(x))
-        past = room_for_history(steps, len(x), updates) if self.smoothed or remembering else None
+        past = room_for_history(steps if self.smoothed or remembering else 0, len(x), updates)
         if second is None:
             zero_velocity(model, x, p, found, past)
         else:
             zero_velocity(model, x, p, found, past, second.echo, heard)
-        if past is not None and self.smoothed:
+        if self.smoothed:
             fixed_interval(past, found.states, found.covariances)
         return Trace(ends_of_steps(recording), model, found, past, heard, p)
 

@@ -171,7 +171,7 @@ def zero_velocity(
     x: FloatArray,
     p: FloatArray,
     found: Found,
-    past: History | None,
+    past: History,
     echo: Echo | None = None,
     heard: Heard | None = None,
 ) -> None:
@@ -183,12 +183,12 @@ def zero_velocity(
     x, p : ndarray (10,), (10, 10), in and out
         State and covariance at the start of the first step; with a second IMU of 15 states.
     found : Found, out
-    past : History or None, out
-        For `simrail.estimators.kalman.fixed_interval`; None where no smoother follows.
+    past : History, out
+        For `simrail.estimators.kalman.fixed_interval`; of no steps where no smoother follows.
     echo, heard : Echo, Heard, optional
         A second IMU, and room for its delays, out.
     """
-    n = x.shape[0]
+    n, keeps = x.shape[0], past.states.shape[0] > 0
     f, work, h = np.eye(n), np.zeros((n, n)), np.zeros((ECHO_UPDATES, n))
     gain, v, turn, variance, scaled = np.zeros(n), np.zeros(n), np.zeros(3), np.zeros(3), np.zeros(5)
     h[REST, V] = h[REST_X, DRIFT_X] = h[REST_Y, DRIFT_Y] = h[REST_Z, DRIFT_Z] = 1.0
@@ -219,7 +219,7 @@ def zero_velocity(
             rest_process[ROLL : PITCH + 1] = model.step_s * max(model.leaning * rocked[0], model.still)
         process = rest_process if rests else model.process
         found.acceleration[k] = _predict(model, signal, rests, process, x, p, f, work)
-        if past is not None:
+        if keeps:
             remember_prediction(past, k, x, p, f)
         noise = rest_noise if rests else model.noise
         for m in range(UPDATES if rests else LATERAL + 1):
@@ -230,7 +230,7 @@ def zero_velocity(
             else:
                 error = _turns(model, signal, m, x, p, rocked, rest_noise)
             s = update(x, p, h[m], error, noise[m], gain, v)
-            if past is not None:
+            if keeps:
                 remember(past, k, m, h[m], gain, error, s)
         if rests:
             found.acceleration[k] = 0.0
@@ -238,7 +238,7 @@ def zero_velocity(
             error, by_delay = _echo(model, echo, heard, k, x, p, found.acceleration, h[ECHO])
             if by_delay > 0.0:
                 s = update(x, p, h[ECHO], error, by_delay, gain, v)
-                if past is not None:
+                if keeps:
                     remember(past, k, ECHO, h[ECHO], gain, error, s)
         keep(found.states, found.covariances, k, x, p)
 

@@ -143,7 +143,9 @@ def profile_filter(model: Model, found: Found) -> float:
     """Run the filter; returns the log-likelihood of the moving gyro, given the accelerometer."""
     n = len(model.start)
     x, p = model.start.copy(), np.zeros((n, 8 * ((n + 7) // 8)))
-    p[:, :n] = model.start_covariance
+    for i in range(n):
+        for c in range(n):
+            p[i, c] = model.start_covariance[i, c]
     row, gain, work = np.zeros(n), np.zeros(n), np.zeros(p.shape[1])
     step, base = model.step_m, model.wheelbase_m
     passed = int(np.floor(model.place[0] / step))

@@ -24,6 +24,7 @@ import numpy as np
 from simrail.estimators.kalman import (
     History,
     congruence,
+    keep,
     remember,
     remember_prediction,
     room_for_history,
@@ -291,13 +292,16 @@ def there_and_back(
     starts, squares = np.zeros((segments, s)), np.zeros((segments, s, s))
     x, p, desk = np.zeros(s), stationary(waves), desk_of(waves)
     for number in range(segments):
-        starts[number], squares[number] = x, p
+        keep(starts, squares, number, x, p)
         last = min((number + 1) * SEGMENT, n)
         run_segment(waves, measured, number * SEGMENT, last, x, p, desk, past, False)
     lam, info = np.zeros(s), np.zeros((s, s))
     for number in range(segments - 1, -1, -1):
         first, last = number * SEGMENT, min((number + 1) * SEGMENT, n)
-        x[:], p[:] = starts[number], squares[number]
+        for i in range(s):
+            x[i] = starts[number, i]
+            for c in range(s):
+                p[i, c] = squares[number, i, c]
         run_segment(waves, measured, first, last, x, p, desk, past, True)
         back(past, first, last, lam, info, desk, wanted, states, covariance)
 

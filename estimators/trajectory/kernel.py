@@ -245,6 +245,13 @@ def linearise(
         rows[5, ROLL] += 2.0 * ydd
 
 
+@njit_inline
+def write_row(rows: FloatArray, k: int, values: FloatArray, count: int) -> None:
+    """So many values into row k, by elements (`simrail.estimators.kalman.keep` says why)."""
+    for i in range(count):
+        rows[k, i] = values[i]
+
+
 @njit_borrowed
 def pack(p: FloatArray, packed: FloatArray, k: int) -> None:
     """Upper triangle of P (12, 16), row by row, into row k of ``packed`` (n, 78)."""
@@ -373,7 +380,7 @@ def trajectory_filter(model: Model, past: Past, out: Filtered) -> float:
             predict(x, p, process, kind, step_s)
             mirror_at(p, k)
         if before.shape[0] > 0:
-            before[k] = x
+            write_row(before, k, x, STATES)
             pack(p, before_covariance, k)
         linearise(x, track, slips, k, gravity, residual, rows)
         for m in range(6):
@@ -404,9 +411,10 @@ def trajectory_filter(model: Model, past: Past, out: Filtered) -> float:
         if likelihoods.shape[0] > 0:
             likelihoods[k] = of_sample
         if innovations.shape[0] > 0:
-            innovations[k, :6], innovations[k, 6] = residual[:6], nis
+            write_row(innovations, k, residual, 6)
+            innovations[k, 6] = nis
         if after.shape[0] > 0:
-            after[k] = x
+            write_row(after, k, x, STATES)
             pack(p, after_covariance, k)
     return likelihood
 
@@ -680,7 +688,7 @@ def trajectory_error(
                 for i in range(first, end):
                     for c in range(first, i + 1):
                         e[i] += roots[kind, i, c] * normals[k, c]
-        errors[k] = e
+        write_row(errors, k, e, STATES)
         linearise(states[k], track, slips, k, gravity, g, rows)
         for m in range(ROWS):
             v = noise_sd[kind, m] * normals[k, STATES + m]

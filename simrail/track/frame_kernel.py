@@ -64,7 +64,8 @@ def polynomial_terms(polynomial: PPoly, places: FloatArray, count: int) -> Float
 def evaluate(pieces: Pieces, s: FloatArray) -> FloatArray:
     """Rows `SINE` to `DK3` (18, n) at places s (n,)."""
     out = np.empty((ROWS, len(s)))
-    _evaluate(pieces.starts, pieces.terms, np.ascontiguousarray(s), out)
+    # Of places that may only be read it would be compiled for anew.
+    _evaluate(pieces.starts, pieces.terms, np.require(s, requirements=["C", "W"]), out)
     return out
 
 

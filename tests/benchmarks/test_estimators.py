@@ -25,6 +25,7 @@ from simrail.estimators.attitude.rest_bias import rest_bias, step_rates
 from simrail.estimators.attitude.veillard_ekf import VeillardEkf
 from simrail.estimators.attitude.veillard_kernel import Model as ElevenStates
 from simrail.estimators.attitude.veillard_kernel import eleven_states, room
+from simrail.estimators.kalman import room_for_history
 from simrail.estimators.odometry import zero_velocity_kernel
 from simrail.estimators.odometry.spectral import FRAME, HOP, spectral_sums
 from simrail.estimators.odometry.zero_velocity import ZeroVelocityOdometry
@@ -230,9 +231,10 @@ def test_zero_velocity_kernel(benchmark: Callable) -> None:
         rounds=2,
     )
     found = zero_velocity_kernel.room(len(model.signals), 4)
+    no_past = room_for_history(0, zero_velocity_kernel.STATES, zero_velocity_kernel.UPDATES)
     us = report(
         benchmark,
-        lambda: zero_velocity(model, *method.start(recording, model), found, None),
+        lambda: zero_velocity(model, *method.start(recording, model), found, no_past),
         len(recording.imu),
         ratio_to_filterpy=theirs,
     )

@@ -307,16 +307,22 @@ def test_light_commands_import_nothing_heavy() -> None:
     subprocess.run([sys.executable, "-c", code], check=True, capture_output=True)
 
 
+def processor_s(*words: str) -> float:
+    """Least time on the processor of three runs of Python, s; a wall's clock tells of other work as well."""
+    seconds = []
+    for _ in range(3):
+        before = resource.getrusage(resource.RUSAGE_CHILDREN)
+        subprocess.run([sys.executable, *words], check=True, capture_output=True)
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)
+        seconds.append(after.ru_utime - before.ru_utime + after.ru_stime - before.ru_stime)
+    return min(seconds)
+
+
 def test_light_commands_answer_at_once() -> None:
+    """About as fast as pandas alone is imported (0.3 and 0.8 of it), whatever the machine."""
+    peer = processor_s("-c", "import pandas")
     for command in ("--version", "list"):
-        seconds = []
-        for _ in range(3):
-            before = resource.getrusage(resource.RUSAGE_CHILDREN)
-            subprocess.run([sys.executable, "-m", "simrail", command], check=True, capture_output=True)
-            after = resource.getrusage(resource.RUSAGE_CHILDREN)
-            # Time on the processor: the clock on the wall tells of the machine's other work as well.
-            seconds.append(after.ru_utime - before.ru_utime + after.ru_stime - before.ru_stime)
-        assert min(seconds) < 0.5, (command, seconds)
+        assert processor_s("-m", "simrail", command) < 1.5 * peer, command
 
 
 @pytest.mark.slow

@@ -569,7 +569,7 @@ def test_finds_what_a_body_turns_in_a_curve(way: float, radius_m: float):
         p,
         out,
         room_to_work(),
-        None,
+        room_for_history(0, STATES, UPDATES),
     )
     middle = np.argmin(np.abs(s[1:] - 500.0))
     assert out.states[middle, TURN] == pytest.approx(turn, abs=5e-5)

@@ -68,7 +68,10 @@ def ride_of(steps: int, *, given: np.ndarray | None = None, scale_sd: float = 0.
     )
 
 
-def run(model: Model, spoken_of: int = STATES, past: History | None = None) -> Found:
+NO_PAST = room_for_history(0, STATES, 1)
+
+
+def run(model: Model, spoken_of: int = STATES, past: History = NO_PAST) -> Found:
     found = room(len(model.signals), spoken_of)
     zero_velocity(model, START.copy(), np.diag(SDS**2), found, past)
     return found
@@ -172,7 +175,7 @@ def judged(force: np.ndarray, steps: int = 200, **changes: np.ndarray) -> Found:
     )
     found = room(steps, 2)
     start = np.zeros(STATES)
-    zero_velocity(model, start, np.diag(SDS**2), found, None)
+    zero_velocity(model, start, np.diag(SDS**2), found, NO_PAST)
     return found
 
 
