@@ -14,6 +14,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache
 
+import numba
 import numpy as np
 import twins.track_relative as twin
 from simrail.estimators.track_relative import states as at
@@ -171,3 +172,46 @@ def test_memory_of_a_long_ride() -> None:
         tracemalloc.stop()
     a_sample = (peaks[1] - peaks[0]) / (counts[1] - counts[0])
     assert peaks[0] + a_sample * LONG_S * 250.0 < MOST_BYTES
+
+
+@numba.njit(error_model="numpy")
+def _less_square(p: FloatArray, gain: FloatArray, v: FloatArray, times: int) -> None:
+    """P (n, w) <- P - K v', so many times; in lanes the n columns of each lie side by side, K is (n, w) and w
+    is n times the lanes."""
+    for _ in range(times):
+        for i in range(p.shape[0]):
+            row, k = p[i], gain[i]
+            for c in range(p.shape[1]):
+                row[c] -= k[c] * v[c]
+
+
+def test_covariances_as_lanes(benchmark: Callable) -> None:
+    """The update of one covariance after the other beside that of eight of them in one loop.
+
+    A covariance of 52 states takes 22 kB and stays in the first cache; eight of them do not, and take half as
+    long again each. So the draws of a ride are no lanes here: this is most of what the filter does.
+    """
+    lanes, times, rng = 8, 500, np.random.default_rng(1)
+    arrays = []
+    for count in (1, lanes):
+        width = at.STATES * count
+        arrays.append(
+            (
+                np.zeros((at.STATES, width)),
+                1e-6 * rng.normal(size=(at.STATES, width)),
+                1e-3 * rng.normal(size=width),
+                times,
+            )
+        )
+    seconds = []
+    for one in arrays:
+        _less_square(*one)
+        seconds.append(min(_seconds(lambda one=one: _less_square(*one)) for _ in range(15)))
+    benchmark.extra_info["ratio_to_alone"] = lanes * seconds[0] / seconds[1]
+    benchmark.pedantic(lambda: _less_square(*arrays[1]), rounds=5, iterations=1)
+
+
+def _seconds(function: Callable[[], object]) -> float:
+    begin = time.perf_counter()
+    function()
+    return time.perf_counter() - begin

@@ -18,6 +18,7 @@ from simrail.estimators.attitude.ekf import AttitudeEkf
 from simrail.estimators.attitude.kernel import attitude_ekf
 from simrail.estimators.attitude.veillard_ekf import VeillardEkf
 from simrail.estimators.attitude.veillard_kernel import Found, Model, eleven_states, room
+from simrail.estimators.kalman import room_for_history
 from simrail.estimators.odometry import zero_velocity_kernel
 from simrail.estimators.odometry.zero_velocity import ZeroVelocityOdometry
 from simrail.estimators.trajectory.smoother import TrajectorySmoother
@@ -90,9 +91,11 @@ def main() -> None:
     slow = stops.model(recording)._replace(rocking=0.0)
     rests = stops.trace(recording).found.log_odds > slow.surely
 
+    no_past = room_for_history(0, zero_velocity_kernel.STATES, zero_velocity_kernel.UPDATES)
+
     def at_stops(run: Callable[..., None], *given: object) -> FloatArray:
         found = zero_velocity_kernel.room(len(slow.signals), 4)
-        run(slow, *stops.start(recording, slow), *given, found, *([] if given else [None]))
+        run(slow, *stops.start(recording, slow), *given, found, *([] if given else [no_past]))
         return found.states
 
     beside(
