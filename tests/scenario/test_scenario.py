@@ -48,7 +48,20 @@ def hunts_above_255(model: object, top_mps: float, *, gravity_mps2: float) -> fl
     return 255.0 / 3.6 if top_mps > 255.0 / 3.6 else None
 
 
-@pytest.mark.parametrize("name", [*sorted(shipped("scenario")), pytest.param("", marks=pytest.mark.slow)])
+LARGE = ("bounds", "bounds_multibody")
+"""Scenarios of thousands of rides, each of which is judged."""
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        *(
+            pytest.param(name, marks=[pytest.mark.long] * (name in LARGE))
+            for name in sorted(shipped("scenario"))
+        ),
+        pytest.param("", marks=pytest.mark.slow),
+    ],
+)
 def test_shipped_scenarios_are_good(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """The critical speed of the kicked vehicle is searched for in the slow case, without a name."""
     if name == "manchester_cases":
