@@ -188,8 +188,8 @@ def _less_square(p: FloatArray, gain: FloatArray, v: FloatArray, times: int) -> 
 def test_covariances_as_lanes(benchmark: Callable) -> None:
     """The update of one covariance after the other beside that of eight of them in one loop.
 
-    A covariance of 52 states takes 22 kB and stays in the first cache; eight of them do not, and take half as
-    long again each. So the draws of a ride are no lanes here: this is most of what the filter does.
+    A covariance of 52 states takes 22 kB and stays in the first cache; eight of them do not, and each takes
+    longer. So the draws of a ride are no lanes here: this is most of what the filter does.
     """
     lanes, times, rng = 8, 500, np.random.default_rng(1)
     arrays = []
