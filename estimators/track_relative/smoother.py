@@ -24,7 +24,13 @@ from typing import Any
 
 import numpy as np
 from simrail.estimators.track_relative import states as at
-from simrail.estimators.track_relative.aiding import Aiding, MagneticHeading, Received, aiding_of
+from simrail.estimators.track_relative.aiding import (
+    Aiding,
+    MagneticHeading,
+    Received,
+    SecondImuSpeed,
+    aiding_of,
+)
 from simrail.estimators.track_relative.kernel import (
     OUTPUTS,
     SEGMENT,
@@ -90,6 +96,8 @@ class TrackRelativeSmoother:
         Take place and speed of the recording's satellite receiver.
     magnetometer : bool
         Take the heading of the recording's magnetometer.
+    second_imu : bool
+        Take the speed by the delay between the recording's two IMUs on two bogies.
     aiding : tuple of Aiding
         What is measured beside what the recording has (`simrail.estimators.track_relative.aiding`).
     """
@@ -105,6 +113,7 @@ class TrackRelativeSmoother:
     wheel: bool = True
     gnss: bool = False
     magnetometer: bool = False
+    second_imu: bool = False
     aiding: tuple[Aiding, ...] = ()
 
     cites = ("briales_2021", "gonzalez_2023", "hartikainen_2010")
@@ -139,8 +148,8 @@ class TrackRelativeSmoother:
 
     @property
     def needs(self) -> tuple[str, ...]:
-        """A receiver and a magnetometer, if they are asked for."""
-        return (*(("gnss",) if self.gnss else ()), *(("magnetometer",) if self.magnetometer else ()))
+        """What is asked for by name."""
+        return tuple(name for name in ("gnss", "magnetometer", "second_imu") if getattr(self, name))
 
     @property
     def causal(self) -> bool:
@@ -202,9 +211,12 @@ class TrackRelativeSmoother:
         motion = motion_of(recording, self.motions()) if self.motion is None else self.motion
         if steps is None:
             steps = steps_of(recording, self.rate_hz, smoothed=self.smoothed)
-        asked: list[Aiding] = [Received()] if self.gnss else []
-        if self.magnetometer:
-            asked.append(MagneticHeading())
+        kinds: dict[str, Aiding] = {
+            "gnss": Received(),
+            "magnetometer": MagneticHeading(),
+            "second_imu": SecondImuSpeed(),
+        }
+        asked = [kinds[name] for name in self.needs]
         aiding = (*aiding_of(recording, smoothed=self.smoothed), *asked, *self.aiding)
         return course_of(recording, steps, motion, aiding, self.without.split())
 
