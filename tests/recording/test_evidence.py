@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -12,6 +13,7 @@ import pytest
 
 from simrail.core.columns import GYRO
 from simrail.core.errors import InputError
+from simrail.recording.evidence.finding import Finding
 from simrail.recording.evidence.judge import Evidence, refuse_wrong, warnings_of, weigh
 from simrail.recording.evidence.way import way_of
 from simrail.recording.files.ride_reader import read_signals
@@ -161,3 +163,9 @@ def test_the_acceleration_of_the_way_is_not_flattened_by_coarse_counts(sound: Re
     x = coarse.acceleration_mps2
     slope = float(x @ fine.acceleration_mps2 / (x @ x))
     assert slope == pytest.approx(1.0, abs=0.05)
+
+
+def test_a_figure_whose_sd_nobody_knows_is_shown() -> None:
+    found = Finding("factor", "gyro", 1.0, math.inf, 1.0, "s", "nothing", "could not be judged")
+    assert found.shown == "1 s (sd unknown)"
+    assert replace(found, sd=0.02, unit="1").shown == "1.000 +- 0.020"

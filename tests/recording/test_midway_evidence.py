@@ -43,7 +43,9 @@ def sound() -> Recording:
                 ("then_yaw", midway(turned(2)), 45.0, 45.0, 3.0),
                 ("then_roll", midway(turned(0)), 45.0, 45.0, 0.3),
                 ("then_offset", missing, 2.0, -2.0, 0.15),
-                ("then_wheel", counted_otherwise, 0.5, 1.0, 0.1),
+                ("then_yaw", midway(turned(2)), 3.0, 3.0, 1.0),
+                ("then_offset", missing, 0.5, -0.5, 0.1),
+                ("then_wheel", counted_otherwise, 0.5, 0.5, 0.05),
             ]
         ),
     ],
@@ -60,19 +62,21 @@ def test_a_change_is_told_with_its_size_and_its_moment(
     evidence = weigh_all(plant(sound, size))
     assert [finding.key for finding in evidence.wrong] == [key]
     found = evidence.of(key)
-    assert found.value == pytest.approx(value, abs=slack) and found.verdict == "surely wrong"
+    assert found.value == pytest.approx(value, abs=slack)
+    assert found.verdict == ("likely wrong" if size in (3.0, 0.5) and key != "then_wheel" else "surely wrong")
     said = found.why.partition("time_s = ")[2].partition(" on ")[0]
     assert float(said) == pytest.approx(HALF_S, abs=2.0 if key == "then_wheel" else 1.0)
     assert "cut the recording" in found.remedy
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("share", [0.5, pytest.param(0.35, marks=LONG)])
+@pytest.mark.parametrize("share", [0.5, 0.35, 0.65])
 def test_a_counter_that_turns_its_sign_is_told_with_the_moment(share: float, sound: Recording) -> None:
     evidence = weigh_all(counted_otherwise(sound, -1.0, share))
     assert [finding.key for finding in evidence.wrong] == ["then_wheel"]
     found = evidence.of("then_wheel")
-    assert found.value == pytest.approx(-2.0, abs=0.1)
+    assert found.value == pytest.approx(-1.0, abs=0.1)
+    assert "the wheel counts backwards (-" in found.why and "reverse" in found.remedy
     said = found.why.partition("time_s = ")[2].partition(" on ")[0]
     assert float(said) == pytest.approx(40.0 * share, abs=1.0)
 

@@ -203,6 +203,24 @@ def test_a_wheel_that_slips_is_no_fault_of_the_file(sound: Recording) -> None:
     assert evidence.of("wheel").value == pytest.approx(1.0, abs=0.05)
 
 
+@pytest.mark.long
+def test_an_axis_whose_gyro_and_accelerometer_come_late_is_told_once(sound: Recording) -> None:
+    columns = ("gyro_y_radps", "accel_y_mps2")
+    evidence = weigh_all(late(columns)(sound, -0.6))
+    assert_told(evidence, "together_y", -0.6, 0.06, "Y of gyro and accelerometer")
+    assert evidence.of("together_y").field == ", ".join(f"imu.{name}" for name in columns)
+
+
+@pytest.mark.long
+def test_an_accelerometer_without_its_sign_is_told_by_what_push_lets_expect(sound: Recording) -> None:
+    """It passes 0 too fast to tell. Of curves of one side an accelerometer has one sign."""
+    without = sound.imu.assign(**{name: sound.imu[name].abs() for name in ACCEL})
+    (found,) = weigh_all(replace(sound, imu=without)).wrong
+    assert found.key == "unsigned_accel_x_mps2" and "its sign is lost" in found.why
+    shifted = replace(sound, imu=sound.imu.assign(accel_x_mps2=sound.imu["accel_x_mps2"] + 1.0))
+    assert not weigh_clipped(shifted)
+
+
 @pytest.mark.parametrize("column", ["gyro_x_radps", *(pytest.param(name, marks=LONG) for name in GYRO[1:])])
 def test_an_axis_without_its_sign_is_told_as_that(column: str, sound: Recording) -> None:
     evidence = weigh_all(replace(sound, imu=sound.imu.assign(**{column: sound.imu[column].abs()})))

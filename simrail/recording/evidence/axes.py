@@ -26,6 +26,7 @@ from simrail.recording.evidence.finding import SURE as CERTAIN
 from simrail.recording.evidence.model import (
     ACCEL_GAIN,
     CUTS,
+    FORCE_X,
     GAINS,
     LATES,
     OF_CHANNEL,
@@ -155,6 +156,7 @@ def weigh_axes(recording: Recording, single: Single | None = None) -> tuple[Find
         )
     if single is not None:
         findings = [_numbered(finding, i, single) for i, finding in enumerate(findings)]
+        findings = _late_together(findings, single)
         findings += [of_all(name, single) for name in single.free if name not in (*GAINS, *LATES)]
     return (*findings, _upright(recording, single))
 
@@ -225,6 +227,36 @@ def _numbered(finding: Finding, channel: int, single: Single) -> Finding:
             return _finding(name, found, "could not be judged", "the ride tells too little of it")
         return _finding(name, found, "sound")
     return finding
+
+
+def _late_together(findings: list[Finding], single: Single) -> list[Finding]:
+    """The findings of `AXES`; one, in place of both, where gyro and accelerometer are late alike."""
+    found = list(findings)
+    for i, axis in enumerate("XY"):
+        pair, lates = (i, i + FORCE_X), (LATES[i], LATES[i + FORCE_X])
+        if not set(lates) & set(single.free) or not set(lates) <= single.told.keys():
+            continue
+        values, sds = np.array([single.told[late] for late in lates]).T
+        if np.any(np.abs(values) < LIKELY * sds) or abs(values[1] - values[0]) > LIKELY * math.hypot(*sds):
+            continue
+        late = values @ sds**-2.0 / np.sum(sds**-2.0)
+        first = next(findings[k] for k, name in zip(pair, lates, strict=True) if name in single.free)
+        side = "late" if late < 0.0 else "early"
+        found[pair[0]] = replace(
+            first,
+            name=f"{axis} of gyro and accelerometer: offset of their clock",
+            key=f"together_{axis.lower()}",
+            value=float(late),
+            sd=float(np.sum(sds**-2.0) ** -0.5),
+            rests_on=" and ".join(AXES[OF_CHANNEL[k]].of for k in pair),
+            verdict=verdict_of(max(single.off(name) for name in lates)),
+            why=f"{axis} of gyro and accelerometer is {abs(late):.2f} s {side}, against all other axes",
+            field=", ".join(findings[k].field for k in pair),
+            remedy="shift both columns, by so many samples: no setting does; or mend how the logger puts "
+            "axes together",
+        )
+        del found[pair[1]]
+    return found
 
 
 def _scaled(name: str, found: Slope, verdict: Verdict, rival: str) -> Finding:
@@ -360,10 +392,7 @@ def _changes(name: str, value: float, sd: float, single: Single) -> Finding:
         why = f"way and IMU are {abs(value):.2f} s apart, by their stamps: {side}"
         remedy = f"{cut}, or give what follows its own stamps: samples that are numbered in a row hide a gap"
     elif of == "wheel":
-        field, quantity = "encoder.count", "change of the factor of the wheel"
-        factor = 1.0 + value / single.found.value("wheel")
-        why = f"the train goes {factor:.3g} times as far as before, for what the device of the way counts"
-        remedy = f"{cut} and give each part its own radius or pulses; mend the wiring of the counter"
+        return _counts(Slope(value, sd), single)
     else:
         column = dict(zip((name for name in THEN if "bias" in name), OF_CHANNEL, strict=True))[name]
         axis, field = AXES[column].name.removesuffix(" alone"), f"imu.{column}"
@@ -388,6 +417,33 @@ def _changes(name: str, value: float, sd: float, single: Single) -> Finding:
         _told(name, single),
         f"from time_s = {single.changed_s:.4g} on {why}",
         field=field,
+        remedy=remedy,
+    )
+
+
+def _counts(change: Slope, single: Single) -> Finding:
+    """The finding of a wheel that counts otherwise from a moment on: per metre, over those before."""
+    begun = single.found.value("wheel")
+    counts = begun / (begun + change.value)
+    sd = counts**2 * change.sd / abs(begun)
+    cut = f"cut the recording at time_s = {single.changed_s:.4g}"
+    if counts < 0.0:
+        why = f"the wheel counts backwards ({counts:.2f} of before)"
+        remedy = f"{cut} and set reverse for what follows, or else for what was; mend the counter's wiring"
+    else:
+        why = f"the wheel counts {counts:.3g} times as much for a metre as before"
+        remedy = f"{cut} and give each part its own radius or pulses; mend the wiring of the counter"
+    return Finding(
+        "counts for a metre, over those before",
+        "then_wheel",
+        counts,
+        sd,
+        1.0,
+        "1",
+        "all of the ride",
+        _told("then_wheel", single),
+        f"from time_s = {single.changed_s:.4g} on {why}",
+        field=single.way,
         remedy=remedy,
     )
 

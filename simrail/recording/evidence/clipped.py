@@ -13,6 +13,8 @@ from scipy.stats import poisson
 from simrail.core.columns import ACCEL, GYRO
 from simrail.core.jit import FloatArray
 from simrail.recording.check_samples import LIVING
+from simrail.recording.evidence.axes import LEAST as LEAST_RMS
+from simrail.recording.evidence.axes import expected_of, seconds_of
 from simrail.recording.evidence.finding import Finding
 from simrail.recording.recording import Recording
 
@@ -32,6 +34,11 @@ AT_ZERO = 20
 signal that only happens to end there its last few are so near."""
 
 
+BOTH, FOLLOWS, CLOSER = 0.1, 0.8, 0.5
+"""Share of the squares of what is expected that either sign has at least, for a sign to be missed; share that
+its size explains of a signal without one; and share of what the signed leaves, that the size may leave."""
+
+
 def weigh_clipped(recording: Recording) -> tuple[Finding, ...]:
     """What a ride says of the ranges of its IMU: a finding for each axis that is cut off.
 
@@ -40,7 +47,7 @@ def weigh_clipped(recording: Recording) -> tuple[Finding, ...]:
     recording : Recording
         A ride; one whose sheet has no noise was computed, and may stand at a value.
     """
-    sheet, found = recording.imu_sheet, []
+    sheet, found, expected = recording.imu_sheet, [], expected_of(recording)
     for names, noise, most, unit in (
         (GYRO, sheet.gyro_noise_radpsqrts, sheet.gyro_range_radps, "rad/s"),
         (ACCEL, sheet.accel_noise_mpsqrts, sheet.accel_range_mps2, "m/s2"),
@@ -52,6 +59,9 @@ def weigh_clipped(recording: Recording) -> tuple[Finding, ...]:
             others = recording.imu[[other for other in names if other != name]].to_numpy()
             # An accelerometer passes 0 too fast to tell, and in curves of one side it has one sign.
             if names is GYRO and _is_unsigned(values, others, sample):
+                found.append(_without_sign(name, values))
+                continue
+            if names is ACCEL and name in expected and _is_folded(recording, name, expected[name]):
                 found.append(_without_sign(name, values))
                 continue
             for side in (1.0, -1.0):
@@ -91,6 +101,19 @@ def _is_unsigned(values: FloatArray, others: FloatArray, noise: float) -> bool:
     if len(np.unique(size[size < near])) < 3:
         return False  # rounded: what is small is 0
     return count >= max(AT_ZERO, next_to // 2) and float(size.max()) > near
+
+
+def _is_folded(recording: Recording, name: str, expected: FloatArray) -> bool:
+    """Whether a signal never passes 0 and follows the size of what is expected (n,), not that itself."""
+    values = recording.imu[name].to_numpy()
+    if values.min() < 0.0 < values.max():
+        return False
+    parts = [float(np.sum(np.minimum(side * expected, 0.0) ** 2)) for side in (1.0, -1.0)]
+    if min(parts) < BOTH * sum(parts) or sum(parts) < len(expected) * LEAST_RMS[name] ** 2:
+        return False
+    size = np.abs(seconds_of(recording, name))
+    folded, signed = (float(np.corrcoef(size, of)[0, 1]) ** 2 for of in (np.abs(expected), expected))
+    return folded > FOLLOWS and 1.0 - folded < CLOSER * (1.0 - signed)
 
 
 def _without_sign(name: str, values: FloatArray) -> Finding:

@@ -1,5 +1,6 @@
 """One figure that a recording says of itself, with what it is worth."""
 
+import math
 from dataclasses import dataclass
 from typing import Literal
 
@@ -63,8 +64,10 @@ class Finding:
     @property
     def shown(self) -> str:
         """Value and standard deviation, rounded to what the latter bears, with the unit."""
-        digits = max(0, min(6, 1 - _exponent(self.sd)))
         unit = "" if self.unit == "1" else f" {self.unit}"
+        if not math.isfinite(self.sd):
+            return f"{self.value:.3g}{unit} (sd unknown)"
+        digits = max(0, min(6, 1 - _exponent(self.sd)))
         return f"{self.value:.{digits}f} +- {self.sd:.{digits}f}{unit}"
 
 

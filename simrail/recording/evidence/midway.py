@@ -104,9 +104,11 @@ def change_of(ride: Ride, found: Fit, blamed: int) -> tuple[Ride, Single] | None
         slack = slack_of(other, one)
         off = {name: distance(name, one.value(name), one.sd(name), slack[name]) for name in change.group}
         wrong = tuple(name for name in change.group if off[name] > LIKELY)
-        if max(off.values()) < SURE or accused(one, slack, WHOLE) or not explains(other, one):
+        if not wrong or accused(one, slack, WHOLE) or not explains(other, one):
             continue
-        if turned is not None or _left_over(one, wrong, one.noise) < LESS * left_over(found, one.noise):
+        is_sure, was_left = max(off.values()) > SURE, left_over(found, one.noise)
+        is_much = is_sure and _left_over(one, wrong, one.noise) < LESS * was_left
+        if (turned is not None and is_sure) or is_much or _instead(one, wrong, was_left, blamed):
             told.append((other, one, wrong, change.group))
     if not told:
         return None
@@ -114,7 +116,14 @@ def change_of(ride: Ride, found: Fit, blamed: int) -> tuple[Ride, Single] | None
     other, one, wrong, group = min(told, key=lambda entry: _left_over(entry[1], entry[2], noise))
     figures = {name: (one.value(name), one.sd(name)) for name in wrong}
     figures |= hints(other, one, [*GAINS, *LATES], free=group)
-    return other, Single(one, wrong, figures, slack_of(other, one), changed_s=_moment_s(other))
+    slack, moment = slack_of(other, one), _moment_s(other)
+    return other, Single(one, wrong, figures, slack, changed_s=moment, way=other.way.device)
+
+
+def _instead(one: Fit, wrong: tuple[str, ...], was_left: float, blamed: int) -> bool:
+    """Whether a change is believed instead of what a fit without it blames: its moment has to save, too."""
+    left = left_over(one, one.noise) + WORTH
+    return blamed > 0 and left + WORTH * len(wrong) < was_left + WORTH * min(blamed, len(wrong))
 
 
 def _left_over(found: Fit, wrong: tuple[str, ...], noise: FloatArray) -> float:
@@ -145,7 +154,7 @@ def bent(ride: Ride, found: Fit) -> list[Change]:
             then: _best_from(_changing(ride, group, then), group, found, ROUGH)
             for then in _moments(count, FEWER)
         }
-        told.append(Change(group, min(fits, key=lambda then: fits[then].cost), 1.0))
+        told.append(Change(group, min(fits, key=lambda then: _bends(fits[then])), 1.0))
     return told
 
 
@@ -244,8 +253,8 @@ def _moved(ride: Ride, change: Change, before: Fit) -> tuple[Ride, Fit]:
         assert best[0].then is not None
         places = (best[0].then - step, best[0].then + step)
         beside = [at(then, FEW) for then in places if ENDS <= then <= count - ENDS]
-        better = min(beside, key=lambda pair: pair[1].cost)
-        if better[1].cost < best[1].cost:
+        better = min(beside, key=lambda pair: _bends(pair[1]))
+        if _bends(better[1]) < _bends(best[1]):
             best = better
         elif step == 1:
             break
@@ -275,7 +284,12 @@ def _turned(ride: Ride) -> int | None:
 def _best_from(ride: Ride, group: tuple[str, ...], before: Fit, rounds: int) -> Fit:
     """The best fit with a change, of those from all starts."""
     fits = [fit(ride, begin, free=group, rounds=rounds) for begin in _starts(group, before)]
-    return min(fits, key=lambda one: one.cost)
+    return min(fits, key=_bends)
+
+
+def _bends(found: Fit) -> float:
+    """What a fit leaves and what it strains: beside the right moment a map that bends may leave as little."""
+    return found.cost + found.strain / found.left.size
 
 
 def _moment_s(ride: Ride) -> float:

@@ -90,6 +90,8 @@ class Single:
         What explains the ride nearly as well as the last of those that are free.
     changed_s : float, optional
         Time stamp of the IMU from which on they hold, where they begin within the ride.
+    way : str
+        Device that says how the train moved.
     """
 
     found: Fit
@@ -98,6 +100,7 @@ class Single:
     slack: dict[str, float]
     rivals: tuple[str, ...] = ()
     changed_s: float | None = None
+    way: str = "encoder"
 
     def off(self, name: str) -> float:
         """How many standard deviations one of those that were looked at is off."""
