@@ -134,8 +134,23 @@ def _deviations(error: FloatArray, metrics: list[str]) -> tuple[list[float], str
         "final": float(error[-1]),
     }
     if "p95" in metrics:
-        values["p95"] = float(np.percentile(size, 95.0, overwrite_input=True))
+        values["p95"] = percentile95(size)
     return [values[name] for name in metrics], OK
+
+
+def percentile95(values: FloatArray) -> float:
+    """What 95 % of some values (n,) are below, between the two nearest; their order is changed.
+
+    The bits of ``numpy.percentile``, whose preparations take ten times as long as the work on the thousand
+    samples of a short window, of which a campaign has thousands.
+    """
+    place = 0.95 * (len(values) - 1)
+    low = int(place)
+    high, share = min(low + 1, len(values) - 1), place - low
+    values.partition((low, high))
+    below, above = float(values[low]), float(values[high])
+    step = above - below
+    return below + step * share if share < 0.5 else above - step * (1.0 - share)
 
 
 def _consistency(error: FloatArray, sd: FloatArray, metrics: list[str]) -> tuple[list[float], str]:
