@@ -16,8 +16,10 @@ from simrail.estimators.odometry.zero_velocity_kernel import PITCH
 from simrail.estimators.odometry.zero_velocity_kernel import V as SPEED
 from simrail.estimators.track_relative import states as at
 from simrail.estimators.track_relative.dual import Dual
+from simrail.estimators.track_relative.measurement import Pose
+from simrail.estimators.track_relative.noise import AXLE, class_of, motion_of
 
-from simrail.core.columns import MAGNETIC
+from simrail.core.columns import MAGNETIC, RAIL_DISPLACEMENT
 from simrail.core.errors import InputError
 from simrail.core.jit import FloatArray
 from simrail.recording.recording import Recording
@@ -38,6 +40,10 @@ DELAY_S = 15.0
 """Over which the errors of a speed by the delay between two bogies hang together: half the area under their
 autocorrelation, 14 s on eight simulated rides of a metro car and 12.5 s on six of the tests' two bogies."""
 
+FOLLOWS = 2.0
+"""Two measurements of which nobody knows how far they hang together are each believed half: by covariance
+intersection with equal weights."""
+
 
 class Rows(NamedTuple):
     """Values and variances, (n, m) each, of m measurements at n steps; infinite where one is not made."""
@@ -53,8 +59,8 @@ class Aiding(Protocol):
         """What was measured, and how well."""
         ...
 
-    def shown(self, x: list[Dual]) -> list[Dual]:
-        """What the states say of it."""
+    def shown(self, x: list[Dual], pose: Pose, /) -> list[Dual]:
+        """What the states, and the body in the map's track by them, say of it."""
         ...
 
 
@@ -68,7 +74,7 @@ class WheelWay:
         variance = np.where(steps.slipping, np.inf, recording.encoder_sheet.pulse_m**2 / 12.0)
         return Rows(steps.way[:, None], variance[:, None])
 
-    def shown(self, x: list[Dual]) -> list[Dual]:
+    def shown(self, x: list[Dual], _pose: Pose) -> list[Dual]:
         """`WAY`, m."""
         return [x[at.WAY]]
 
@@ -82,7 +88,7 @@ class Standstill:
         variance = np.where(steps.resting, STANDS_MPS**2, np.inf)
         return Rows(np.zeros((len(variance), 1)), variance[:, None])
 
-    def shown(self, x: list[Dual]) -> list[Dual]:
+    def shown(self, x: list[Dual], _pose: Pose) -> list[Dual]:
         """`V`, m/s."""
         return [x[at.V]]
 
@@ -101,7 +107,7 @@ class OdometryPlace:
         variance = np.where(steps.resting, np.inf, sd**2 * ODOMETRY_S / steps.dt)
         return Rows(steps.odometry[:, :1], variance[:, None])
 
-    def shown(self, x: list[Dual]) -> list[Dual]:
+    def shown(self, x: list[Dual], _pose: Pose) -> list[Dual]:
         """`S`, m."""
         return [x[at.S]]
 
@@ -119,7 +125,7 @@ class Odometer:
             number, speed.to_numpy(dtype=np.float64), recording.odometer_sheet.speed_sd_mps, steps
         )
 
-    def shown(self, x: list[Dual]) -> list[Dual]:
+    def shown(self, x: list[Dual], _pose: Pose) -> list[Dual]:
         """V (1 + `SCALE`), m/s."""
         return [x[at.V] + x[at.V] * x[at.SCALE]]
 
@@ -177,7 +183,7 @@ class Fixes:
         run = (steps.time_s[last] - time) * steps.odometry[last, 1]
         return _at_steps(number, np.asarray(self.position_m, dtype=np.float64) + run, self.sd_m, steps)
 
-    def shown(self, x: list[Dual]) -> list[Dual]:
+    def shown(self, x: list[Dual], _pose: Pose) -> list[Dual]:
         """`S`, m."""
         return [x[at.S]]
 
@@ -219,7 +225,7 @@ class Received:
             both.append(_at_steps(number, seen + more, sd, steps))
         return Rows(np.hstack([rows.values for rows in both]), np.hstack([rows.variances for rows in both]))
 
-    def shown(self, x: list[Dual]) -> list[Dual]:
+    def shown(self, x: list[Dual], _pose: Pose) -> list[Dual]:
         """`S`, m, and `V`, m/s."""
         return [x[at.S], x[at.V]]
 
@@ -258,7 +264,7 @@ class SecondImuSpeed:
         speed = states[:, SPEED] * np.cos(states[:, PITCH]) + run
         return _at_steps(number, speed, sd * math.sqrt(shared), steps)
 
-    def shown(self, x: list[Dual]) -> list[Dual]:
+    def shown(self, x: list[Dual], _pose: Pose) -> list[Dual]:
         """`V`, m/s."""
         return [x[at.V]]
 
@@ -306,9 +312,65 @@ class MagneticHeading:
         out.variances[first:, 0] = variance + (turned[first:] ** 2) * ODOMETRY_S / steps.dt
         return out
 
-    def shown(self, x: list[Dual]) -> list[Dual]:
+    def shown(self, x: list[Dual], _pose: Pose) -> list[Dual]:
         """`HEADING` and `YAW`, rad."""
         return [x[at.HEADING] + x[at.YAW]]
+
+
+@dataclass(frozen=True)
+class SeenRails:
+    """How a body rolls and where it is in its track, by a sensor that sees both rails from it.
+
+    With u_l and u_r the rails seen from the mount and p its place in the track, the rails stand at p + A u
+    (`simrail.estimators.trajectory.track_geometry`). On rails without irregularities
+
+        roll = atan2(u_r,z - u_l,z, u_l,y - u_r,y),      p = -A (u_l + u_r) / 2
+
+    of the medians over a step, which leave outliers aside. What irregularities add is a process over the
+    distance: as white noise that tells as much of what is slow it has the variance c sd^2 length / way, with
+    c = 4/sqrt(3) of a Matern 3/2 process and 16/(3 sqrt(5)) of a Matern 5/2, and a train that stands learns
+    nothing. Sizes are those by which the mount moves in its track
+    (`simrail.estimators.track_relative.noise`), which rails are not rougher than. In long waves a body
+    follows the rails, so that its motion and this noise are one and not two: each is believed half
+    (`FOLLOWS`). An axle stands on the rails and sees them always alike, which says nothing of it.
+    """
+
+    def rows(self, recording: Recording, steps: "Steps") -> Rows:
+        """Made while the train runs; on an axle there is none."""
+        frame, sheet = recording.rail_displacement, recording.rail_sensor_sheet
+        if frame is None or sheet is None:
+            raise InputError(
+                "the recording has no rail sensor",
+                field="rail_displacement",
+                limit="a recording with both rails as they are seen from the IMU",
+                remedy="add [rail_sensor] to the scenario or [rail_displacement] to the ride file, or set "
+                "rail_sensor = false",
+            )
+        n, block = len(steps.time_s), round(steps.dt * recording.imu_sheet.rate_hz)
+        seen = frame[list(RAIL_DISPLACEMENT)].to_numpy(dtype=np.float64)[: n * block]
+        left_y, left_z, right_y, right_z = np.median(seen.reshape(n, block, 4), axis=1).T
+        roll = np.arctan2(right_z - left_z, left_y - right_y)
+        y, z, c, s = 0.5 * (left_y + right_y), 0.5 * (left_z + right_z), np.cos(roll), np.sin(roll)
+        values = np.column_stack([roll, s * z - c * y, -s * y - c * z])
+        motion, base = motion_of(recording), recording.track.rail_base_m
+        three, five = 4.0 / math.sqrt(3.0), 16.0 / (3.0 * math.sqrt(5.0))
+        by_way = FOLLOWS * np.array(
+            [
+                three * motion.roll_sd**2 * motion.roll_length,
+                five * motion.y_sd**2 * motion.y_length,
+                five * motion.z_sd**2 * motion.z_length,
+            ]
+        )
+        own = sheet.noise_m**2 / block * np.array([2.0 / base**2, 0.5, 0.5])
+        way = np.abs(steps.odometry[:, 1]) * steps.dt
+        runs = ~steps.resting & (way > 0.0) & (class_of(recording) is not AXLE)
+        variances = np.full((n, 3), math.inf)
+        variances[runs] = by_way / way[runs, None] + own
+        return Rows(values, variances)
+
+    def shown(self, _x: list[Dual], pose: Pose) -> list[Dual]:
+        """Roll beside the track as it lies, rad, and the place in it, m."""
+        return [pose.level, pose.y, pose.z]
 
 
 def _steps_after(time: FloatArray, steps: "Steps") -> npt.NDArray[np.int64]:

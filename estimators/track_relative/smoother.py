@@ -29,6 +29,7 @@ from simrail.estimators.track_relative.aiding import (
     MagneticHeading,
     Received,
     SecondImuSpeed,
+    SeenRails,
     aiding_of,
 )
 from simrail.estimators.track_relative.kernel import (
@@ -56,6 +57,14 @@ from simrail.recording.recording import Recording
 
 MOST_PASSES = 4
 """Two are enough: the train is found to a decimetre by the first."""
+
+ASKED: dict[str, Aiding] = {
+    "gnss": Received(),
+    "magnetometer": MagneticHeading(),
+    "second_imu": SecondImuSpeed(),
+    "rail_sensor": SeenRails(),
+}
+"""What is taken where it is asked for, by the option."""
 
 PIECE = 8 * SEGMENT
 """Steps that are linearised at a time: a minute."""
@@ -98,6 +107,9 @@ class TrackRelativeSmoother:
         Take the heading of the recording's magnetometer.
     second_imu : bool
         Take the speed by the delay between the recording's two IMUs on two bogies.
+    rail_sensor : bool
+        Take how the body rolls and where it is in its track by the recording's rail sensor. The rails are
+        made of what it sees either way.
     aiding : tuple of Aiding
         What is measured beside what the recording has (`simrail.estimators.track_relative.aiding`).
     """
@@ -114,6 +126,7 @@ class TrackRelativeSmoother:
     gnss: bool = False
     magnetometer: bool = False
     second_imu: bool = False
+    rail_sensor: bool = False
     aiding: tuple[Aiding, ...] = ()
 
     cites = ("briales_2021", "gonzalez_2023", "hartikainen_2010")
@@ -149,7 +162,7 @@ class TrackRelativeSmoother:
     @property
     def needs(self) -> tuple[str, ...]:
         """What is asked for by name."""
-        return tuple(name for name in ("gnss", "magnetometer", "second_imu") if getattr(self, name))
+        return tuple(name for name in ASKED if getattr(self, name))
 
     @property
     def causal(self) -> bool:
@@ -211,12 +224,7 @@ class TrackRelativeSmoother:
         motion = motion_of(recording, self.motions()) if self.motion is None else self.motion
         if steps is None:
             steps = steps_of(recording, self.rate_hz, smoothed=self.smoothed)
-        kinds: dict[str, Aiding] = {
-            "gnss": Received(),
-            "magnetometer": MagneticHeading(),
-            "second_imu": SecondImuSpeed(),
-        }
-        asked = [kinds[name] for name in self.needs]
+        asked = [ASKED[name] for name in self.needs]
         aiding = (*aiding_of(recording, smoothed=self.smoothed), *asked, *self.aiding)
         return course_of(recording, steps, motion, aiding, self.without.split())
 

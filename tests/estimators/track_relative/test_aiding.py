@@ -32,6 +32,9 @@ from simrail.recording.recording import MagnetometerSheet, OdometerSheet, Record
 from simrail.sensors.gnss import GnssSpec, Outage, sample_gnss
 from simrail.sensors.magnetometer import MagnetometerSpec, sample_magnetometer
 
+NOWHERE: Any = None
+"""The body in its track, of which these say nothing."""
+
 
 def alone(recording: Recording) -> Recording:
     return replace(recording, encoder=None, encoder_sheet=None)
@@ -83,7 +86,7 @@ def test_every_class_shows_what_it_measures(rough: Callable) -> None:
     frame = pd.DataFrame({"speed_mps": [1.0]}, index=pd.Index([2.0], name="time_s"))
     full = replace(recording, odometer=frame, odometer_sheet=sheet)
     for kind, values in wanted.items():
-        (shown,) = kind.shown(x)
+        (shown,) = kind.shown(x, NOWHERE)
         np.testing.assert_allclose(shown.value, values)
         rows = kind.rows(full, steps)
         assert rows.values.shape == rows.variances.shape == (len(steps.time_s), 1)
@@ -161,7 +164,7 @@ def test_a_receiver_is_of_the_step_after_it_came(rough: Callable, rough_motion: 
     first = int(np.searchsorted(steps.end_s, came - 1e-9))
     assert np.isfinite(rows.variances[first, 0]) and np.isinf(rows.variances[first - 1, 0])
     states = stream(3, "states").standard_normal((4, at.STATES))
-    place, speed = kind.shown(duals(states))
+    place, speed = kind.shown(duals(states), NOWHERE)
     np.testing.assert_allclose(place.value, states[:, at.S])
     np.testing.assert_allclose(speed.value, states[:, at.V])
 
@@ -214,7 +217,7 @@ def test_a_magnetic_heading_is_of_how_far_it_left_the_map(rough: Callable, rough
     late = steps.time_s > 0.5 * motion.index[-1] + 1.0
     np.testing.assert_allclose((planted.values - plain.values)[late], 0.1, atol=1e-3)
     states = stream(3, "states").standard_normal((4, at.STATES))
-    (heading,) = kind.shown(duals(states))
+    (heading,) = kind.shown(duals(states), NOWHERE)
     np.testing.assert_allclose(heading.value, states[:, at.HEADING] + states[:, at.YAW])
 
 

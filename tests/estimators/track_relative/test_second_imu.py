@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -25,6 +26,9 @@ from simrail.track.map_errors import MapErrors, draw_map
 from simrail.vehicle.speed_profile import SpeedProfile
 
 ERRORS = MapErrors(cant_sd_m=0.004, cant_along_sd_m=5e-4, radius_relative_sd=0.01, place_sd_m=0.5)
+NOWHERE: Any = None
+"""The body in its track, of which these say nothing."""
+
 AT = Mount("front", "body", (0.0, 0.0, 1.1))
 
 
@@ -69,7 +73,7 @@ def test_a_row_is_of_a_delay_that_was_believed(monkeypatch: pytest.MonkeyPatch) 
     assert rows.values[7, 0] == pytest.approx(20.0 * np.cos(0.1) + 0.5 * (0.31 - 0.3))
     assert rows.variances[7, 0] == pytest.approx(0.04**2 * 2.0 * DELAY_S / 0.5)
     drawn = stream(3, "states").standard_normal((4, at.STATES))
-    (shown,) = SecondImuSpeed().shown(duals(drawn))
+    (shown,) = SecondImuSpeed().shown(duals(drawn), NOWHERE)
     np.testing.assert_array_equal(shown.value, drawn[:, at.V])
     assert set(shown.slopes) == {at.V}
 
