@@ -104,6 +104,8 @@ def test_what_it_shows_follows_the_states(rough: Callable) -> None:
         for before, after, part in zip(plain, shown(moved), parts, strict=True):
             np.testing.assert_allclose((after.value - before.value) / 1e-6, part, atol=1e-6)
             np.testing.assert_allclose(before.slopes.get(state, np.zeros(4)), part, atol=1e-12)
+    # The body leans on that cant, and lies on it with the rails.
+    np.testing.assert_allclose(plain[0].slopes[at.CANT_ALONG], states[:, at.TILT])
     for state in (at.TILT, at.Y_TILT, at.Y_BEND, at.CANT):
         moved = states.copy()
         moved[:, state] += 1e-6
