@@ -72,6 +72,15 @@ def keep(states: FloatArray, covariances: FloatArray, k: int, x: FloatArray, p: 
 
 
 @njit_borrowed
+def take(x: FloatArray, p: FloatArray, mean: FloatArray, covariance: FloatArray) -> None:
+    """State x (n,) and its covariance p (n, n) from those that were kept, by elements as in `keep`."""
+    for i in range(x.shape[0]):
+        x[i] = mean[i]
+        for c in range(x.shape[0]):
+            p[i, c] = covariance[i, c]
+
+
+@njit_borrowed
 def remember_prediction(past: History, k: int, x: FloatArray, p: FloatArray, f: FloatArray) -> None:
     """Put predicted state, covariance and F of step k into the history."""
     keep(past.states, past.covariances, k, x, p)
@@ -281,16 +290,11 @@ def product(a: FloatArray, b: FloatArray, out: FloatArray) -> None:
 
 
 @njit_borrowed
-def product_of_transposed(a: FloatArray, b: FloatArray, out: FloatArray) -> None:
-    """Out (m, k) = A' B of A (n, m), most of whose entries may be zero, and B (n, k)."""
-    for i in range(out.shape[0]):
-        for c in range(out.shape[1]):
-            out[i, c] = 0.0
-    for j in range(a.shape[0]):
-        for i in range(out.shape[0]):
-            if a[j, i] != 0.0:
-                for c in range(out.shape[1]):
-                    out[i, c] += a[j, i] * b[j, c]
+def transpose(a: FloatArray, out: FloatArray) -> None:
+    """Out (n, m) = A' of A (m, n), for `congruence` and `product` with F'."""
+    for i in range(a.shape[0]):
+        for c in range(a.shape[1]):
+            out[c, i] = a[i, c]
 
 
 @njit_borrowed
@@ -364,7 +368,7 @@ def fixed_interval(past: History, states: FloatArray, covariances: FloatArray) -
     """
     steps, n = past.states.shape
     lam, info, v = np.zeros(n), np.zeros((n, n)), np.zeros(n)
-    work, shrunk = np.zeros((n, n)), np.zeros((n, n))
+    back, work, shrunk = np.zeros((n, n)), np.zeros((n, n)), np.zeros((n, n))
     for k in range(steps - 1, -1, -1):
         for m in range(past.rows.shape[1] - 1, -1, -1):
             if past.inverses[k, m] > 0.0:
@@ -381,7 +385,7 @@ def fixed_interval(past: History, states: FloatArray, covariances: FloatArray) -
             for c in range(n):
                 covariances[k, i, c] = p[i, c] - shrunk[i, c]
         row_product(lam, f, v)
-        product(info, f, work)
-        product_of_transposed(f, work, info)
         for i in range(n):
             lam[i] = v[i]
+        transpose(f, back)
+        congruence(back, info, work)

@@ -22,7 +22,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
-from simrail.estimators.kalman import mirror, update
+from simrail.estimators.kalman import mirror, take, update
 from simrail.estimators.odometry.moving_start import (
     ACCELERATION_SD_MPS2,
     BACK_S,
@@ -270,15 +270,6 @@ def ahead(x: FloatArray, p: FloatArray, lead: float, intensity: float, out: Floa
 
 
 @njit_inline
-def _take(x: FloatArray, p: FloatArray, mean: FloatArray, covariance: FloatArray) -> None:
-    """X and P from a mean and a covariance, by elements (`simrail.estimators.kalman.keep` says why)."""
-    for i in range(x.shape[0]):
-        x[i] = mean[i]
-        for j in range(x.shape[0]):
-            p[i, j] = covariance[i, j]
-
-
-@njit_inline
 def _begin(p: FloatArray, q: float, speed_sd: float) -> None:
     """Covariance of a train at speed before any reading has been followed, in place."""
     p[:, :] = 0.0
@@ -380,7 +371,7 @@ def _filter(
             _begin(p, q, SPEED_SD_MPS)
         if k == shown:
             resting = False
-            _take(x, p, anew, anew_p)
+            take(x, p, anew, anew_p)
         if resting:
             _stand(x, p, q, max(idle, 1e-3), start_speed, start_acceleration)
         until = time[k + 1] if k + 1 < len(time) else np.inf

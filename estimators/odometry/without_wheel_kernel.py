@@ -12,10 +12,10 @@ from simrail.estimators.kalman import (
     congruence,
     keep,
     product,
-    product_of_transposed,
     remember,
     remember_prediction,
     row_product,
+    transpose,
     update,
     withdraw_information,
 )
@@ -135,7 +135,7 @@ def neighbours(
     """
     (steps, n), m = past.states.shape, len(picked)
     info, carried, kept = np.zeros((n, n)), np.zeros((n, m)), np.zeros((n, m))
-    filtered, work, v = np.zeros((n, n)), np.zeros((n, n)), np.zeros(n)
+    filtered, back, work, v = np.zeros((n, n)), np.zeros((n, n)), np.zeros((n, n)), np.zeros(n)
     across, lost, turned = np.zeros((m, n)), np.zeros((m, n)), np.ascontiguousarray(picked.T)
     for k in range(steps - 1, -1, -1):
         predicted = past.covariances[k]
@@ -160,10 +160,9 @@ def neighbours(
             for i in range(m):
                 for c in range(m):
                     before[k + 1, i, c] = after[k, i, c]
-        f = past.transitions[k]
-        product_of_transposed(f, kept, carried)
-        product(info, f, work)
-        product_of_transposed(f, work, info)
+        transpose(past.transitions[k], back)
+        product(back, kept, carried)
+        congruence(back, info, work)
 
 
 @njit_borrowed

@@ -120,7 +120,7 @@ class Odometer:
         """Each reading is that of the step that ends next."""
         assert recording.odometer is not None and recording.odometer_sheet is not None
         speed = recording.odometer["speed_mps"]
-        number = _steps_after(speed.index.to_numpy(dtype=np.float64), steps)
+        number, _, _ = _step_after(speed.index.to_numpy(dtype=np.float64), steps)
         return _at_steps(
             number, speed.to_numpy(dtype=np.float64), recording.odometer_sheet.speed_sd_mps, steps
         )
@@ -177,10 +177,9 @@ class Fixes:
     def rows(self, _recording: Recording, steps: "Steps") -> Rows:
         """Each is brought forward to the step that ends next; of several in one step the last counts."""
         time = np.asarray(self.time_s, dtype=np.float64)
-        number = _steps_after(time, steps)
-        last = np.minimum(number, len(steps.time_s) - 1)
+        number, last, since = _step_after(time, steps)
         # A step of 32 ms at 80 km/h is 0.7 m.
-        run = (steps.time_s[last] - time) * steps.odometry[last, 1]
+        run = since * steps.odometry[last, 1]
         return _at_steps(number, np.asarray(self.position_m, dtype=np.float64) + run, self.sd_m, steps)
 
     def shown(self, x: list[Dual], _pose: Pose) -> list[Dual]:
@@ -201,16 +200,15 @@ class Received:
         """Made where there is a sample of either."""
         frame, sheet = recording.gnss, recording.gnss_sheet
         if frame is None or sheet is None:
-            raise InputError(
-                "the recording has no satellite receiver",
+            raise _lacking(
+                "satellite receiver",
                 field="gnss",
                 limit="a recording with place or speed by satellite",
-                remedy="add [gnss] to the scenario or the ride file, or set gnss = false",
+                add="[gnss] to the scenario or the ride file",
             )
         time = frame.index.to_numpy(dtype=np.float64)
-        number = _steps_after(time, steps)
-        last = np.minimum(number, len(steps.time_s) - 1)
-        since = steps.time_s[last] - (time - sheet.latency_s)
+        number, last, since = _step_after(time, steps)
+        since += sheet.latency_s
         speed, acceleration = steps.odometry[last, 1], steps.odometry[last, 2]
         counts = max(1.0, 2.0 * sheet.correlation_s * sheet.rate_hz)
         sds = (
@@ -245,20 +243,19 @@ class SecondImuSpeed:
     def rows(self, recording: Recording, steps: "Steps") -> Rows:
         """Made where a delay was believed."""
         if recording.second_imu is None or recording.second_imu_sheet is None:
-            raise InputError(
-                "the recording has no second IMU",
+            raise _lacking(
+                "second IMU",
                 field="second_imu",
                 limit="an IMU on another bogie",
-                remedy="add [second_imu] to the scenario or the ride file, or set second_imu = false",
+                add="[second_imu] to the scenario or the ride file",
             )
         method = BogieDelayOdometry()
         trace = method.trace(recording)
         assert trace.heard is not None
         (heard,) = np.nonzero(trace.heard.searches[:, 0] == 1.0)
         time, states = trace.time_s[heard], trace.found.states[heard]
-        number = _steps_after(time, steps)
-        last = np.minimum(number, len(steps.time_s) - 1)
-        run = (steps.time_s[last] - time) * steps.odometry[last, 2]
+        number, last, since = _step_after(time, steps)
+        run = since * steps.odometry[last, 2]
         sd = np.sqrt(trace.found.covariances[heard, SPEED, SPEED])
         shared = max(1.0, 2.0 * DELAY_S / method.every_s)
         speed = states[:, SPEED] * np.cos(states[:, PITCH]) + run
@@ -282,11 +279,11 @@ class MagneticHeading:
         """Made from the first step on in which the train runs."""
         field, sheet = recording.magnetometer, recording.magnetometer_sheet
         if field is None or sheet is None:
-            raise InputError(
-                "the recording has no magnetometer",
+            raise _lacking(
+                "magnetometer",
                 field="magnetometer",
                 limit="a recording with a magnetometer",
-                remedy="add a [magnetometer] to the scenario or the ride file, or set magnetometer = false",
+                add="a [magnetometer] to the scenario or the ride file",
             )
         n = len(steps.time_s)
         out = Rows(np.zeros((n, 1)), np.full((n, 1), math.inf))
@@ -339,12 +336,12 @@ class SeenRails:
         """Made while the train runs; on an axle there is none."""
         frame, sheet = recording.rail_displacement, recording.rail_sensor_sheet
         if frame is None or sheet is None:
-            raise InputError(
-                "the recording has no rail sensor",
+            raise _lacking(
+                "rail sensor",
                 field="rail_displacement",
                 limit="a recording with both rails as they are seen from the IMU",
-                remedy="add [rail_sensor] to the scenario or [rail_displacement] to the ride file, or set "
-                "rail_sensor = false",
+                add="[rail_sensor] to the scenario or [rail_displacement] to the ride file",
+                option="rail_sensor",
             )
         n, block = len(steps.time_s), round(steps.dt * recording.imu_sheet.rate_hz)
         seen = frame[list(RAIL_DISPLACEMENT)].to_numpy(dtype=np.float64)[: n * block]
@@ -373,9 +370,26 @@ class SeenRails:
         return [pose.level, pose.y, pose.z]
 
 
-def _steps_after(time: FloatArray, steps: "Steps") -> npt.NDArray[np.int64]:
-    """Number of the step that ends at each time or next after it; that of none beyond the last."""
-    return np.searchsorted(steps.end_s, time - 1e-9)
+def _lacking(what: str, *, field: str, limit: str, add: str, option: str = "") -> InputError:
+    """Of what an option asks for that is not there; the option's name is the field's if none is given."""
+    return InputError(
+        f"the recording has no {what}",
+        field=field,
+        limit=limit,
+        remedy=f"add {add}, or set {option or field} = false",
+    )
+
+
+def _step_after(
+    time: FloatArray, steps: "Steps"
+) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64], FloatArray]:
+    """Number of the step that ends at each time or next after it; that of none beyond the last.
+
+    The same, of none the last; and what goes by from each time to that step's, s.
+    """
+    number = np.searchsorted(steps.end_s, time - 1e-9)
+    last = np.minimum(number, len(steps.time_s) - 1)
+    return number, last, steps.time_s[last] - time
 
 
 def _at_steps(

@@ -31,7 +31,7 @@ from simrail.estimators.track_relative import states as at
 from simrail.estimators.track_relative.dual import Dual
 from simrail.estimators.track_relative.full_rate import LEAST_ACCEL_MPS2, LEAST_GYRO_RADPS, at_samples
 from simrail.estimators.track_relative.line import ground_at
-from simrail.estimators.track_relative.measurement import deviation_of, pose_of
+from simrail.estimators.track_relative.measurement import pose_of
 from simrail.estimators.track_relative.noise import BODY, class_of
 from simrail.estimators.track_relative.output import Trace
 from simrail.estimators.trajectory.track_geometry import Sight, over_space
@@ -85,7 +85,7 @@ def ends_of(recording: Recording, trace: Trace) -> Ends | None:
         return None
     course, x = trace.course, [Dual(column) for column in trace.states.T]
     ground = ground_at(recording, course.lines, trace.states[:, at.S])
-    pose = pose_of(x, ground, course.around, deviation_of(x, ground, course.around))
+    pose = pose_of(x, ground, course.around)
     # A body whose nose is down has a positive pitch; what the design has along its chord is no motion.
     turns = np.column_stack([(pose.rho[2] - ground.askew[2]).value, (ground.askew[1] - pose.rho[1]).value])
     sheet = recording.imu_sheet

@@ -21,7 +21,7 @@ from scipy.interpolate import CubicSpline
 from simrail.estimators.track_relative import states as at
 from simrail.estimators.track_relative.dual import Dual
 from simrail.estimators.track_relative.line import ground_at
-from simrail.estimators.track_relative.measurement import deviation_of, pose_of, shown
+from simrail.estimators.track_relative.measurement import pose_of, shown
 from simrail.estimators.track_relative.model import MOTION_RATE_HZ
 from simrail.estimators.track_relative.noise import AT_MPS
 from simrail.estimators.track_relative.output import Trace
@@ -121,14 +121,14 @@ def held_of(recording: Recording, trace: Trace) -> Held:
     states[:, FAST] = 0.0
     x = [Dual(column) for column in states.T]
     ground, around = ground_at(recording, course.lines, states[:, at.S]), course.around
-    seen, track = shown(x, ground, around), deviation_of(x, ground, around)
+    pose = pose_of(x, ground, around)
+    seen, track = shown(x, ground, around, pose), pose.track
     # Leaned, a body feels along z what pulls it to the side.
     for state in (at.ROLL, at.ROLL_SLOW, at.PITCH):
         x[state] = Dual(trace.states[:, state])
-    seen[5] = shown(x, ground, around)[5]
+    seen[5] = shown(x, ground, around, pose_of(x, ground, around))[5]
     for state in (at.ROLL, at.ROLL_SLOW, at.PITCH):
         x[state] = Dual(states[:, state])
-    pose = pose_of(x, ground, around, track)
     speed, g, frame = states[:, at.V], recording.gravity_mps2, ground.frame
     track_roll = frame.roll_rad + track.cant.value
     bent = frame.rates[:, 2] + track.curvature.value
@@ -165,7 +165,7 @@ def beside_rails(recording: Recording, trace: Trace) -> FloatArray:
     """
     course, x = trace.course, [Dual(column) for column in trace.states.T]
     ground = ground_at(recording, course.lines, trace.states[:, at.S])
-    pose = pose_of(x, ground, course.around, deviation_of(x, ground, course.around))
+    pose = pose_of(x, ground, course.around)
     return at_samples(recording, trace, (pose.rho[0] - pose.level).value)
 
 

@@ -86,6 +86,8 @@ class Pose(NamedTuple):
 
     Attributes
     ----------
+    track : Deviation
+        What is below it.
     rho, rho_rate : Vector
         Small turn out of the map's track, and its rate.
     level : Dual
@@ -95,6 +97,7 @@ class Pose(NamedTuple):
         Place of the mount in the track, and its derivatives by time.
     """
 
+    track: Deviation
     rho: Vector
     rho_rate: Vector
     level: Dual
@@ -133,8 +136,9 @@ def deviation_of(x: list[Dual], ground: Ground, around: Around) -> Deviation:
     )
 
 
-def pose_of(x: list[Dual], ground: Ground, around: Around, track: Deviation) -> Pose:
+def pose_of(x: list[Dual], ground: Ground, around: Around) -> Pose:
     """Where the body is in the map's track, and how that changes with time."""
+    track = deviation_of(x, ground, around)
     v, a, g = x[at.V], x[at.A], around.gravity
     run, behind = _run(x, around), -around.sense
     lag, lead = x[at.LAG] * behind, x[at.LEAD] * behind
@@ -165,6 +169,7 @@ def pose_of(x: list[Dual], ground: Ground, around: Around, track: Deviation) -> 
     own, gain = v.value * v.value, a.value * around.sense
     bend_rate_2 = v * v * ground.bend[2] + a * ground.bend[1]
     return Pose(
+        track=track,
         rho=rho,
         rho_rate=rho_rate,
         level=roll + beside if around.sees_rails else roll,
@@ -189,10 +194,9 @@ def _run(x: list[Dual], around: Around) -> FloatArray:
     return np.asarray(x[at.V].value * around.sense)
 
 
-def shown(x: list[Dual], ground: Ground, around: Around) -> list[Dual]:
+def shown(x: list[Dual], ground: Ground, around: Around, pose: Pose) -> list[Dual]:
     """What three gyros and three accelerometers show, rad/s and m/s2."""
-    track = deviation_of(x, ground, around)
-    pose = pose_of(x, ground, around, track)
+    track = pose.track
     rate = _rate(x, ground, track)
     seen, borne = turned(rate, pose.rho), turned(_felt(x, ground, around, track, pose, rate), pose.rho)
     gyro = [seen[i] + pose.rho_rate[i] + x[at.GYRO_BIAS[i]] + x[at.GYRO_OF_Z[i]] * rate[2] for i in range(3)]
@@ -231,14 +235,13 @@ def _felt(
     )
 
 
-def told(x: list[Dual], ground: Ground, around: Around) -> list[Dual]:
+def told(x: list[Dual], ground: Ground, around: Around, pose: Pose) -> list[Dual]:
     """What the estimate says: turn of the body out of the map's track (three), S, V, y, z, and roll.
 
     The slopes are those of roll, pitch and yaw of the body, in which the map is read at S and turned by
     HEADING. The last is the roll that is the rails' (`Pose.level`): the track is taken off where the train
     is, so that the place has no share in it.
     """
-    pose = pose_of(x, ground, around, deviation_of(x, ground, around))
     here = x[at.S] - around.states[:, at.S]
     roll, pitch, yaw = ground.frame.rates.T
     return [

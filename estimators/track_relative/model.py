@@ -19,7 +19,7 @@ from simrail.estimators.track_relative.aiding import Aiding, Rows
 from simrail.estimators.track_relative.dual import table_of
 from simrail.estimators.track_relative.kernel import FLOWS, Model, Noise
 from simrail.estimators.track_relative.line import Ground, Lines, ground_at, lines_of, numbers_at
-from simrail.estimators.track_relative.measurement import Around, deviation_of, duals, pose_of, shown, told
+from simrail.estimators.track_relative.measurement import Around, duals, pose_of, shown, told
 from simrail.estimators.track_relative.noise import AT_MPS, Motion, slow_m_of
 from simrail.estimators.track_relative.prior import first_state, noise_of, start_of
 
@@ -214,10 +214,10 @@ def linearised(course: Course, rows: slice) -> Model:
     around = whole._replace(states=whole.states[rows], jerk=whole.jerk[rows], sense=whole.sense[rows])
     ground, n = ground_at(course.recording, course.lines, around.states[:, at.S]), len(around.jerk)
     x = duals(around.states)
-    pose = pose_of(x, ground, around, deviation_of(x, ground, around))
+    pose = pose_of(x, ground, around)
     beside = [row for kind in course.aiding for row in kind.shown(x, pose)]
-    values, columns, coefficients = table_of([*shown(x, ground, around), *beside], n)
-    _, said_columns, said = table_of(told(x, ground, around), n)
+    values, columns, coefficients = table_of([*shown(x, ground, around, pose), *beside], n)
+    _, said_columns, said = table_of(told(x, ground, around, pose), n)
     # z - h(x0) - H (x - x0) = (z - h(x0) + H x0) - H x
     constant = np.einsum("nmw,nmw->nm", coefficients, around.states[:, columns])
     measured = np.hstack([steps.signals[rows], course.aided.values[rows]])

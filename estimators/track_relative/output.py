@@ -15,7 +15,7 @@ from scipy.interpolate import CubicSpline
 from simrail.estimators.track_relative import states as at
 from simrail.estimators.track_relative.dual import table_of
 from simrail.estimators.track_relative.line import ground_at
-from simrail.estimators.track_relative.measurement import Around, deviation_of, duals, pose_of, told
+from simrail.estimators.track_relative.measurement import Around, duals, pose_of, told
 from simrail.estimators.track_relative.model import Course
 
 from simrail.core.columns import (
@@ -154,7 +154,7 @@ def _found(course: Course, states: FloatArray, around: Around) -> tuple[FloatArr
     """Small turn (three), heading, S, V, A, y and z at n steps, and their rates: (n, 9) each."""
     around = around._replace(states=states)
     ground, x = ground_at(course.recording, course.lines, states[:, at.S]), duals(states)
-    pose = pose_of(x, ground, around, deviation_of(x, ground, around))
+    pose = pose_of(x, ground, around)
     none = np.zeros(len(states))
     turn, turning = (angle.value for angle in pose.rho), (rate.value for rate in pose.rho_rate)
     values = [*turn, *states[:, [at.HEADING, at.S, at.V, at.A]].T, pose.y.value, pose.z.value]
@@ -167,8 +167,8 @@ def _before(course: Course) -> tuple[FloatArray, FloatArray]:
     states = course.start[None, :]
     around = course.around._replace(states=states, jerk=np.zeros(1), sense=np.ones(1))
     values, _ = _found(course, states, around)
-    ground = ground_at(course.recording, course.lines, states[:, at.S])
-    _, columns, rows = table_of(told(duals(states), ground, around), 1)
+    ground, x = ground_at(course.recording, course.lines, states[:, at.S]), duals(states)
+    _, columns, rows = table_of(told(x, ground, around, pose_of(x, ground, around)), 1)
     outputs = np.zeros((len(columns), at.STATES))
     np.add.at(outputs, (np.arange(len(columns))[:, None], columns), rows[0])
     covariance = outputs @ course.start_covariance[:, : at.STATES] @ outputs.T

@@ -28,6 +28,9 @@ from simrail.estimators.kalman import (
     remember,
     remember_prediction,
     room_for_history,
+    row_product,
+    take,
+    transpose,
     update,
     withdraw,
     withdraw_information,
@@ -298,10 +301,7 @@ def there_and_back(
     lam, info = np.zeros(s), np.zeros((s, s))
     for number in range(segments - 1, -1, -1):
         first, last = number * SEGMENT, min((number + 1) * SEGMENT, n)
-        for i in range(s):
-            x[i] = starts[number, i]
-            for c in range(s):
-                p[i, c] = squares[number, i, c]
+        take(x, p, starts[number], squares[number])
         run_segment(waves, measured, first, last, x, p, desk, past, True)
         back(past, first, last, lam, info, desk, wanted, states, covariance)
 
@@ -327,11 +327,7 @@ def back(
             h, gain = past.rows[at, m], past.gains[at, m]
             withdraw(lam, h, gain, past.errors[at, m])
             if sure:
-                for c in range(s):
-                    total = 0.0
-                    for i in range(s):
-                        total += gain[i] * info[i, c]
-                    v[c] = total
+                row_product(gain, info, v)
                 withdraw_information(info, h, gain, past.inverses[at, m], v)
         p, f = past.covariances[at], past.transitions[at]
         for a in range(wanted.shape[0]):
@@ -340,18 +336,12 @@ def back(
             for c in range(s):
                 total -= p[i, c] * lam[c]
             states[k, a] = total
-        for i in range(s):
-            total = 0.0
-            for c in range(s):
-                total += f[c, i] * lam[c]
-            v[i] = total
+        row_product(lam, f, v)
         for i in range(s):
             lam[i] = v[i]
         if sure:
             speak(p, info, wanted, v, covariance[k])
-            for i in range(s):
-                for c in range(s):
-                    desk.f[c, i] = f[i, c]
+            transpose(f, desk.f)
             congruence(desk.f, info, desk.work)
 
 
@@ -360,11 +350,7 @@ def speak(p: FloatArray, info: FloatArray, wanted: IntArray, v: FloatArray, out:
     """P - P Lam P for the states that are wanted."""
     s = p.shape[0]
     for a in range(wanted.shape[0]):
-        for c in range(s):
-            total = 0.0
-            for j in range(s):
-                total += p[wanted[a], j] * info[j, c]
-            v[c] = total
+        row_product(p[wanted[a]], info, v)
         for b in range(wanted.shape[0]):
             total = p[wanted[a], wanted[b]]
             for c in range(s):

@@ -47,7 +47,7 @@ def weigh_clipped(recording: Recording) -> tuple[Finding, ...]:
     recording : Recording
         A ride; one whose sheet has no noise was computed, and may stand at a value.
     """
-    sheet, found, expected = recording.imu_sheet, [], expected_of(recording)
+    sheet, found = recording.imu_sheet, []
     for names, noise, most, unit in (
         (GYRO, sheet.gyro_noise_radpsqrts, sheet.gyro_range_radps, "rad/s"),
         (ACCEL, sheet.accel_noise_mpsqrts, sheet.accel_range_mps2, "m/s2"),
@@ -61,7 +61,7 @@ def weigh_clipped(recording: Recording) -> tuple[Finding, ...]:
             if names is GYRO and _is_unsigned(values, others, sample):
                 found.append(_without_sign(name, values))
                 continue
-            if names is ACCEL and name in expected and _is_folded(recording, name, expected[name]):
+            if names is ACCEL and _is_folded(recording, name):
                 found.append(_without_sign(name, values))
                 continue
             for side in (1.0, -1.0):
@@ -103,10 +103,13 @@ def _is_unsigned(values: FloatArray, others: FloatArray, noise: float) -> bool:
     return count >= max(AT_ZERO, next_to // 2) and float(size.max()) > near
 
 
-def _is_folded(recording: Recording, name: str, expected: FloatArray) -> bool:
-    """Whether a signal never passes 0 and follows the size of what is expected (n,), not that itself."""
+def _is_folded(recording: Recording, name: str) -> bool:
+    """Whether a signal never passes 0 and follows the size of what is expected, not that itself."""
     values = recording.imu[name].to_numpy()
     if values.min() < 0.0 < values.max():
+        return False
+    expected = expected_of(recording).get(name)
+    if expected is None:
         return False
     parts = [float(np.sum(np.minimum(side * expected, 0.0) ** 2)) for side in (1.0, -1.0)]
     if min(parts) < BOTH * sum(parts) or sum(parts) < len(expected) * LEAST_RMS[name] ** 2:

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from simrail.estimators.track_relative import states as at
 from simrail.estimators.track_relative.dual import Dual
 from simrail.estimators.track_relative.line import Ground, Lines, ground_at, lines_of
-from simrail.estimators.track_relative.measurement import Around, duals, shown, told
+from simrail.estimators.track_relative.measurement import Around, Pose, duals, pose_of, shown, told
 
 from simrail.core.jit import FloatArray
 from simrail.core.seeds import stream
@@ -101,14 +101,19 @@ PLACES = np.array([30.0, 83.25, 130.0, 172.5, 190.25, 264.75, 320.0, 385.0, 450.
 
 SPEEDS = np.array([12.0, -15.0, 20.0, 16.0, -19.0, 14.0, 0.5, -9.0, 17.0])
 
-Shown = Callable[[list[Dual], Ground, Around], list[Dual]]
+Shown = Callable[[list[Dual], Ground, Around, Pose], list[Dual]]
+
+
+def rows_of(formula: Shown, x: list[Dual], ground: Ground, around: Around) -> list[Dual]:
+    """What is shown or told of states, by the pose that they say."""
+    return formula(x, ground, around, pose_of(x, ground, around))
 
 
 def slopes_by_step(formula: Shown, states: FloatArray, ground: Ground, around: Around, i: int) -> FloatArray:
     """Complex step: exact to rounding."""
     moved = states.astype(complex)
     moved[:, i] += 1e-30j
-    rows = formula(duals(moved), ground, around)  # type: ignore[arg-type]
+    rows = rows_of(formula, duals(moved), ground, around)  # type: ignore[arg-type]
     return np.array([row.value.imag / 1e-30 for row in rows])
 
 
@@ -118,7 +123,7 @@ def test_slopes_equal_the_complex_step(exact_bend: Recording, formula: Shown, in
     """Of every state but the place, to rounding; of speed and acceleration with a body at rest in it."""
     states = random_states(PLACES, SPEEDS, "slopes")
     ground = ground_at(exact_bend, wavy(lines_of(exact_bend)), states[:, at.S])
-    found = formula(duals(states), ground, around_of(states, in_time=in_time))
+    found = rows_of(formula, duals(states), ground, around_of(states, in_time=in_time))
     for i in range(at.STATES):
         if i == at.S:
             continue
@@ -126,7 +131,7 @@ def test_slopes_equal_the_complex_step(exact_bend: Recording, formula: Shown, in
             resting = at_rest(states, in_time=in_time)
             around = around_of(resting, in_time=in_time)
             ours, wanted = (
-                formula(duals(resting), ground, around),
+                rows_of(formula, duals(resting), ground, around),
                 slopes_by_step(formula, resting, ground, around, i),
             )
         else:
@@ -142,7 +147,7 @@ def test_the_speed_is_known_where_the_body_moves(exact_bend: Recording) -> None:
     states[:, at.TILT_RATE] = 0.0  # it turns the body by the rate of the cant: of second order in all
     ground = ground_at(exact_bend, lines_of(exact_bend), states[:, at.S])
     still = at_rest(states)
-    moving, resting = (shown(duals(x), ground, around_of(x)) for x in (states, still))
+    moving, resting = (rows_of(shown, duals(x), ground, around_of(x)) for x in (states, still))
     for row in range(3):
         np.testing.assert_array_equal(moving[row].slopes[at.V], resting[row].slopes[at.V])
 
@@ -166,12 +171,12 @@ def test_slopes_by_the_place_equal_steps_on_the_map(exact_bend: Recording, formu
         ground = ground_at(exact_bend, lines, moved[:, at.S])._replace(dk=here.dk)
         # The turn is out of the map's track where the train is: about the moved states.
         linear_about = around if formula is shown else around_of(moved)
-        rows = np.array([row.value for row in formula(duals(moved), ground, linear_about)])
+        rows = np.array([row.value for row in rows_of(formula, duals(moved), ground, linear_about)])
         if formula is told:
             rows[:3] += [ground.frame.roll_rad, ground.frame.pitch_rad, ground.frame.yaw_rad]
         sides.append(rows)
     wanted = (sides[0] - sides[1]) / (2.0 * h)
-    found = formula(duals(states), here, around)
+    found = rows_of(formula, duals(states), here, around)
     left_out = SPEEDS**2 * here.frame.rates[:, 1] ** 2
     for number, (row, slope) in enumerate(zip(found, wanted, strict=True)):
         error = np.abs(row.slopes.get(at.S, 0.0 * slope) - slope)
@@ -181,8 +186,8 @@ def test_slopes_by_the_place_equal_steps_on_the_map(exact_bend: Recording, formu
 def test_the_outputs_are_the_states_that_they_are_named_after(exact_bend: Recording) -> None:
     """Roll, pitch, yaw, S, V, y and z by the states of that name; and the yaw by the heading of the map."""
     states = random_states(PLACES, SPEEDS, "outputs")
-    rows = told(
-        duals(states), ground_at(exact_bend, lines_of(exact_bend), states[:, at.S]), around_of(states)
+    rows = rows_of(
+        told, duals(states), ground_at(exact_bend, lines_of(exact_bend), states[:, at.S]), around_of(states)
     )
     named = (at.ROLL, at.PITCH, at.YAW, at.S, at.V, at.Y, at.Z)
     for number, state in (*enumerate(named), (2, at.HEADING)):
@@ -363,7 +368,10 @@ def test_a_body_moved_through_time_shows_it(
     sense, jerk, ground = float(np.sign(speed)), 0.1, smooth_ground(track, place)
     for x in states:
         found = np.array(
-            [row.value[0] for row in shown(duals(x[None]), ground, around_of(x[None], in_time=in_time))]
+            [
+                row.value[0]
+                for row in rows_of(shown, duals(x[None]), ground, around_of(x[None], in_time=in_time))
+            ]
         )
         rate, force, of_track, rho_rate = sensed(Moving(x, place, track, sense, jerk, in_time))
         gyro, accel = left_out(Moving(x, place, track, sense, jerk, in_time), rho_rate, of_track)

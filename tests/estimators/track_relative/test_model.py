@@ -10,7 +10,7 @@ import pytest
 from simrail.estimators.track_relative import states as at
 from simrail.estimators.track_relative.aiding import WheelWay
 from simrail.estimators.track_relative.line import ground_at
-from simrail.estimators.track_relative.measurement import duals, shown
+from simrail.estimators.track_relative.measurement import duals, pose_of, shown
 from simrail.estimators.track_relative.model import (
     START_JERK_S,
     Steps,
@@ -92,7 +92,8 @@ def test_the_linear_model_is_the_measurement_where_it_is_linearised(rough: Calla
     model, x0 = linearised(course, rows), course.around.states[rows]
     around = course.around._replace(states=x0, jerk=course.around.jerk[rows], sense=course.around.sense[rows])
     ground = ground_at(recording, course.lines, x0[:, at.S])
-    h = np.array([row.value for row in shown(duals(x0), ground, around)]).T
+    pose = pose_of(duals(x0), ground, around)
+    h = np.array([row.value for row in shown(duals(x0), ground, around, pose)]).T
     linear = np.array([whole_rows(model.columns, c) @ x for c, x in zip(model.coefficients, x0, strict=True)])
     np.testing.assert_allclose((model.measured - linear)[:, :6], steps.signals[rows] - h, rtol=0, atol=1e-12)
     np.testing.assert_allclose((model.measured - linear)[:, 6], steps.way[rows] - x0[:, at.WAY], atol=1e-9)

@@ -14,7 +14,7 @@ from simrail.estimators.track_relative import aiding
 from simrail.estimators.track_relative import states as at
 from simrail.estimators.track_relative.aiding import SeenRails
 from simrail.estimators.track_relative.line import ground_at
-from simrail.estimators.track_relative.measurement import deviation_of, duals, pose_of
+from simrail.estimators.track_relative.measurement import duals, pose_of
 from simrail.estimators.track_relative.noise import AXLE, WAGON
 from simrail.estimators.track_relative.smoother import TrackRelativeSmoother
 
@@ -95,7 +95,7 @@ def test_what_it_shows_follows_the_states(rough: Callable) -> None:
 
     def shown(values: np.ndarray) -> list:
         x = duals(values)
-        return SeenRails().shown(x, pose_of(x, ground, around, deviation_of(x, ground, around)))
+        return SeenRails().shown(x, pose_of(x, ground, around))
 
     plain = shown(states)
     for state, parts in ((at.ROLL, (1.0, 0.0, 0.0)), (at.Y, (0.0, 1.0, 0.0)), (at.Z, (0.0, 0.0, 1.0))):
