@@ -10,8 +10,7 @@ from simrail.cli.options import DONE, number
 from simrail.core.errors import InputError
 from simrail.core.toml_files import label, read_toml
 from simrail.estimation.recorded_ride import judged_ride
-from simrail.recording.check_field import field_warnings
-from simrail.recording.check_noise import noise_warnings
+from simrail.recording.doubts import doubts
 from simrail.recording.evidence.devices import weigh_all
 from simrail.recording.evidence.judge import Evidence
 from simrail.recording.files.mend import write_mended
@@ -51,7 +50,7 @@ def check_ride(path: Path, write: Path | None) -> int:
     print_evidence(console, evidence, title=f"{label(ride_file(path))}: {recording.name}")
     for note in recording.notes:
         console.print(f"note: {note}", markup=False, soft_wrap=True)
-    told = (*noise_warnings(recording), *field_warnings(recording))
+    told = doubts(recording)
     for warning in told:
         console.print(f"warning: {warning}", markup=False, soft_wrap=True)
     if write is None:

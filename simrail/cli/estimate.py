@@ -74,8 +74,7 @@ def estimate(
     from simrail.campaign.progress import ProgressWatcher
     from simrail.cli.estimate_ride import DEFAULT, chosen_methods, estimate_ride, ride_with_warnings
     from simrail.core.toml_files import blame, label
-    from simrail.recording.check_field import field_warnings
-    from simrail.recording.check_noise import noise_warnings
+    from simrail.recording.doubts import doubts
     from simrail.recording.files.ride_reader import ride_file
 
     chosen, wanted, named = form_of(form), _units(units), list(estimators or [])
@@ -117,7 +116,7 @@ def estimate(
         found, files = estimate_ride(
             whole, methods, folder, file=label(file), format=chosen, units=wanted, watcher=watcher
         )
-    for warning in (*noise_warnings(whole.recording), *field_warnings(whole.recording)):
+    for warning in doubts(whole.recording):
         print(f"warning: {warning}", file=sys.stderr)
     console = Console(highlight=False)
     if not console.is_terminal:

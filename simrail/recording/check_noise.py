@@ -4,28 +4,17 @@ Noise is told best at rest, at any stop. A train that never stands shakes its de
 wheels shake grows with the speed, and what does so alike at any speed is the device's own.
 """
 
-from typing import NamedTuple
-
 import numpy as np
 
-from simrail.core.columns import ACCEL, GYRO
 from simrail.core.jit import FloatArray
-from simrail.recording.check_samples import STUCK_COUNTS, imu_bounds
+from simrail.recording.check_samples import STUCK_COUNTS
 from simrail.recording.evidence.way import way_of
 from simrail.recording.recording import ImuSheet, Recording, imus
-from simrail.recording.standstill import rest_periods
-
-_TRIADS = (
-    ("gyro", GYRO, "rad/s", "gyro_resolution_radps"),
-    ("accel", ACCEL, "m/s2", "accel_resolution_mps2"),
-)
+from simrail.recording.triads import Triad, rests_of, sample_noise, triads_of
 
 LOUD, SILENT = {"gyro": 10.0, "accel": 30.0}, 0.1
 """Noise at rest over that of the sheet from which on it is told: an engine that idles shakes the
 accelerometer more than the gyro; and below which samples were smoothed, or are of a better device."""
-
-REST_SAMPLES = 40
-"""Of a rest that noise is taken from: its standard deviation is known to some 15 % by so many."""
 
 HUM, HUM_SAMPLES, HUM_SHARE, SLOW_HZ = 0.3, 128, 0.5, 5.0
 """Share of `LOUD` from which on a single tone at rest is told; samples of such a rest; what the tone has at
@@ -43,26 +32,6 @@ ROUNDED = float(np.sqrt(12.0))
 """Steps over the noise of a sample from which on rounding leaves more than the device does."""
 
 
-class _Signal(NamedTuple):
-    """A triad beside its sheet: samples (n, 3), the steps of their numbers (3,), noise, one count; in SI."""
-
-    field: str
-    kind: str
-    unit: str
-    values: FloatArray
-    steps: FloatArray
-    noise: float
-    least: float
-    sheet: ImuSheet
-
-    def beside(self, found: float) -> str:
-        """A noise, beside that of the sheet, in words."""
-        return (
-            f"is {found / self.noise:.3g} times that of {self.sheet.grade} ({self.noise:.2g} {self.unit} at "
-            f"{self.sheet.rate_hz:g} Hz)"
-        )
-
-
 def noise_warnings(recording: Recording) -> tuple[str, ...]:
     """Warnings, a line each, of a noise that is far from what the sheet says, and of what hides it.
 
@@ -78,8 +47,8 @@ def noise_warnings(recording: Recording) -> tuple[str, ...]:
     """
     told: list[str] = []
     for table, alone in imus(recording):
-        rests = _rests(alone)
-        for signal in _signals(alone, table):
+        rests = rests_of(alone)
+        for signal in triads_of(alone, table):
             told += _rounded(signal)
             if signal.noise < STUCK_COUNTS * signal.steps.min():
                 continue  # what is left is rounding
@@ -88,41 +57,7 @@ def noise_warnings(recording: Recording) -> tuple[str, ...]:
     return tuple(told)
 
 
-def _signals(recording: Recording, table: str) -> list[_Signal]:
-    """The triads whose sheet has noise."""
-    sheet, found = recording.imu_sheet, []
-    for kind, columns, unit, resolution in _TRIADS:
-        noise = float(imu_bounds(sheet)[kind].noise * np.sqrt(sheet.rate_hz))
-        values = recording.imu[list(columns)].to_numpy()
-        if noise > 0.0 and len(values) > 2:
-            steps = np.array([_step(values[:, axis], 1e-9 * noise) for axis in range(3)])
-            count = getattr(sheet, resolution)
-            found.append(_Signal(f"{table}.{kind}", kind, unit, values, steps, noise, count, sheet))
-    return found
-
-
-def _step(values: FloatArray, least: float) -> float:
-    """Step of the numbers of an axis: the least between two of them; infinity where all are one."""
-    apart = np.diff(np.sort(values))
-    return float(apart[apart > least].min(initial=np.inf))
-
-
-def _rests(recording: Recording) -> list[slice]:
-    """The samples of each rest that is long enough."""
-    times, rests = recording.imu.index.to_numpy(), rest_periods(recording)
-    found = [
-        slice(*np.searchsorted(times, (start, end)))
-        for start, end in zip(rests["start_s"], rests["end_s"], strict=True)
-    ]
-    return [rest for rest in found if rest.stop - rest.start >= REST_SAMPLES]
-
-
-def _noise(values: FloatArray) -> float:
-    """Noise of a sample of the worst axis, by second differences."""
-    return float(np.diff(values, n=2, axis=0).std(axis=0).max()) / float(np.sqrt(6.0))
-
-
-def _at_rest(signal: _Signal, rests: list[slice]) -> list[str]:
+def _at_rest(signal: Triad, rests: list[slice]) -> list[str]:
     """Warnings of a tone at rest, else of a noise that is too loud or too silent in all rests."""
     longest = max(rests, key=lambda rest: rest.stop - rest.start)
     tone = _tone(signal.values[longest], signal.sheet.rate_hz)
@@ -133,7 +68,7 @@ def _at_rest(signal: _Signal, rests: list[slice]) -> list[str]:
             f"{signal.beside(size)}: mains or a motor in its supply (or a faster tone that folds there), "
             "or an engine that shakes it"
         ]
-    found = [_noise(signal.values[rest]) for rest in rests]
+    found = [sample_noise(signal.values[rest]) for rest in rests]
     if min(found) > LOUD[signal.kind] * signal.noise:
         noise, why = min(found), "the device is another, or shakes while the train stands"
     elif max(found) < SILENT * signal.noise:
@@ -162,7 +97,7 @@ def _tone(values: FloatArray, rate_hz: float) -> tuple[float, float] | None:
     return peak * rate_hz / count, float(np.sqrt(tone))
 
 
-def _under_way(signal: _Signal, recording: Recording) -> list[str]:
+def _under_way(signal: Triad, recording: Recording) -> list[str]:
     """A warning of a noise that is too loud and alike at all speeds, on a ride without a rest."""
     size = max(WINDOW_SAMPLES, round(WINDOW_S * signal.sheet.rate_hz))
     count = len(signal.values) // size
@@ -171,7 +106,7 @@ def _under_way(signal: _Signal, recording: Recording) -> list[str]:
         return []
     times = recording.imu.index.to_numpy()[: count * size].reshape(count, size).mean(axis=1)
     speed = np.quantile(np.interp(times, way.time_s, np.abs(way.speed_mps)), (0.1, 0.9))
-    noise = np.array([_noise(part) for part in np.split(signal.values[: count * size], count)])
+    noise = np.array([sample_noise(part) for part in np.split(signal.values[: count * size], count)])
     least, most = np.quantile(noise, (0.1, 0.9))
     if most > ALIKE * least or speed[1] < FASTER * speed[0] or least < LOUD[signal.kind] * signal.noise:
         return []
@@ -182,7 +117,7 @@ def _under_way(signal: _Signal, recording: Recording) -> list[str]:
     ]
 
 
-def _rounded(signal: _Signal) -> list[str]:
+def _rounded(signal: Triad) -> list[str]:
     """A warning of numbers in steps that leave more than the noise, and that the sheet does not have."""
     steps = signal.steps
     axis = int(np.argmax(np.where(np.isfinite(steps), steps, 0.0)))

@@ -11,10 +11,10 @@ import pandas as pd
 
 from simrail.core.columns import ACCEL, GYRO
 from simrail.core.errors import InputError
-from simrail.recording.evidence.axes import SURE, Slope, means, slope
 from simrail.recording.evidence.devices import weigh_all
 from simrail.recording.evidence.exchanged import weigh_exchange
 from simrail.recording.evidence.judge import Evidence, error_of, refuse_wrong
+from simrail.recording.evidence.slopes import SURE, Slope, means, slope
 from simrail.recording.evidence.way import way_of
 from simrail.recording.recording import Recording, imus
 from simrail.recording.signals import FORCES

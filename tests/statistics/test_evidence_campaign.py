@@ -19,6 +19,7 @@ import pytest
 
 from simrail.campaign.cell import record_cell, simulated
 from simrail.campaign.progress import Watcher
+from simrail.recording.doubts import doubts
 from simrail.recording.evidence.devices import weigh_all
 from simrail.recording.evidence.judge import KINDS, weigh
 from simrail.recording.recording import Recording
@@ -85,6 +86,7 @@ def false_alarms(recordings: Sequence[tuple[str, Recording]]) -> list[str]:
     found = []
     for name, recording in recordings:
         found += [f"{name}: {finding.key} {finding.shown}" for finding in weigh_all(recording).wrong]
+        found += [f"{name}: {told}" for told in doubts(recording)]
     return found
 
 

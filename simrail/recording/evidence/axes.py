@@ -15,109 +15,42 @@ behind a low-pass, and stamps whose second is none.
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
-from simrail.core.columns import ACCEL, GYRO
-from simrail.core.jit import FloatArray
+from simrail.core.columns import GYRO
 from simrail.recording.evidence.finding import LIKELY, Finding, Verdict, verdict_of
 from simrail.recording.evidence.finding import SURE as CERTAIN
-from simrail.recording.evidence.model import (
-    ACCEL_GAIN,
-    CUTS,
-    FORCE_X,
-    GAINS,
-    LATES,
-    OF_CHANNEL,
-    PACE,
-    RAMPS,
-    SLOW,
-    THEN,
-    TURNS,
-)
+from simrail.recording.evidence.model import ACCEL_GAIN, FORCE_X, GAINS, LATES, OF_CHANNEL
+from simrail.recording.evidence.of_all import ALL_ACCEL, of_all, or_else, verdict_by
 from simrail.recording.evidence.single import Single, Up, up_of
-from simrail.recording.evidence.slack import distance
-from simrail.recording.evidence.way import way_of
+from simrail.recording.evidence.slopes import (
+    AXES,
+    FX,
+    FY,
+    FZ,
+    LEAST,
+    NEXT_TO_NONE,
+    OTHER_SIGN,
+    OTHER_UNIT,
+    RX,
+    RY,
+    RZ,
+    SURE,
+    WANTED,
+    Slope,
+    expected_of,
+    key_of,
+    seconds_of,
+    slope,
+)
 from simrail.recording.recording import Recording
-
-OTHER_SIGN, OTHER_UNIT = 0.4, 4.0
-"""Slopes beyond which (below minus, above) an axis has the other sign, or another unit."""
-
-NEXT_TO_NONE = 0.2
-"""Size of a slope below which an axis does not follow at all; in rad/s for deg/s it has 0.017."""
 
 SQUARE = 1.4
 """Slopes between 1 over this and this, of either sign, are those of an axis that follows."""
 
-SURE = 6.0
-"""Standard deviations that a slope must be off 1 before a ride is refused for it; they take seconds as
-independent, which sway and drift are not."""
-
-WANTED = 1.0 / SURE
-"""Standard deviation of a slope up to which its sign is told: minus 1 is then `SURE` of them off nothing."""
-
-
-class Slope(NamedTuple):
-    """Slope of a least-squares line, and its standard deviation (white)."""
-
-    value: float
-    sd: float
-
-    @property
-    def against(self) -> bool:
-        """Whether it has the other sign."""
-        return self.value < -OTHER_SIGN and -self.value > SURE * self.sd
-
-    @property
-    def along(self) -> bool:
-        """Whether it has the sign that it should have."""
-        return self.value > OTHER_SIGN and self.value > SURE * self.sd
-
-    @property
-    def many(self) -> bool:
-        """Whether it is many times too large."""
-        return self.value > OTHER_UNIT and self.value - 1.0 > SURE * self.sd
-
-    @property
-    def none(self) -> bool:
-        """Whether it is next to none."""
-        return abs(self.value) < NEXT_TO_NONE and 1.0 - self.value > SURE * self.sd
-
-
-class Axis(NamedTuple):
-    """How an axis is told: its name, what it is held against, and what a ride without a word of it lacks."""
-
-    name: str
-    of: str
-    lacks: str
-
-
-RX, RY, RZ = GYRO
-FX, FY, FZ = ACCEL
-
-AXES = {
-    RX: Axis("gyro X alone", "the roll rate of the transitions", "no transition with cant"),
-    RY: Axis("gyro Y alone", "the pitch rate of the line", "no vertical and no canted curve to tell it by"),
-    RZ: Axis("gyro Z alone", "the curves", "no curve"),
-    FX: Axis("accelerometer X alone", "the change of speed", "no change of speed to tell it by"),
-    FY: Axis("accelerometer Y alone", "what speed and cant leave of the curves", "no curve to feel"),
-}
-"""Which axes are judged, in the order in which they are told."""
-
 APART = 1.5
 """Standard deviations between two explanations from which on one is preferred."""
-
-ALL_ACCEL = "factor of the accelerometer"
-
-SENSORS = {SLOW[0]: "gyro", SLOW[1]: "accelerometer"}
-
-G = 9.80665
-"""Standard gravity, m/s2."""
-
-LEAST = dict.fromkeys((RX, RY, RZ), 2e-4) | dict.fromkeys((FX, FY), 0.02)
-"""Rms of what the line lets expect, in means over a second, rad/s and m/s2, below which it tells nothing of
-an axis: rails and bodies move as much by themselves, and a noiseless IMU would make a sure fault of it."""
 
 AS_A_WHOLE = (
     ((RX, RY, FX, FY), (RZ,)),
@@ -171,38 +104,11 @@ def _slopes(recording: Recording) -> tuple[dict[str, Slope], Slope]:
     return slopes, slope(found[RY], expected[RX], LEAST[RX])
 
 
-def seconds_of(recording: Recording, name: str) -> FloatArray:
-    """Means (n,) over a second of a column of the IMU."""
-    return means(recording.imu[name].to_numpy(), max(1, round(recording.imu_sheet.rate_hz)))
-
-
-def expected_of(recording: Recording) -> dict[str, FloatArray]:
-    """Means (n,) over a second that map and way let expect of each of `AXES`; nothing without either."""
-    way = way_of(recording) if recording.track.is_map else None
-    if way is None:
-        return {}
-    count, time = max(1, round(recording.imu_sheet.rate_hz)), recording.imu.index.to_numpy(dtype=np.float64)
-    went, speed, push = (
-        means(np.interp(time, way.time_s, values), count)
-        for values in (way.way_m, way.speed_mps, way.acceleration_mps2)
-    )
-    frame = recording.track.frame_extended(recording.start_position_m + went)
-    along, level = -np.sin(frame.pitch_rad), np.cos(frame.pitch_rad) * np.sin(frame.roll_rad)
-    gravity = recording.gravity_mps2
-    return {
-        RX: frame.k[:, 0] * speed,
-        RY: frame.k[:, 1] * speed,
-        RZ: frame.k[:, 2] * speed,
-        FX: push + gravity * along,
-        FY: frame.k[:, 2] * speed**2 + gravity * level,
-    }
-
-
 def _numbered(finding: Finding, channel: int, single: Single) -> Finding:
     """The finding of an axis with its number, by the fit of all."""
     name, gain, late = OF_CHANNEL[channel], GAINS[channel], LATES[channel]
     if gain in single.free:
-        return _scaled(name, Slope(*single.told[gain]), _told(gain, single), _or(gain, single))
+        return _scaled(name, Slope(*single.told[gain]), verdict_by(gain, single), or_else(gain, single))
     if late in single.free:
         value, side = single.told[late][0], "late" if single.told[late][0] < 0.0 else "early"
         return replace(
@@ -210,13 +116,13 @@ def _numbered(finding: Finding, channel: int, single: Single) -> Finding:
             name=f"{AXES[name].name}: offset of its clock",
             nominal=0.0,
             unit="s",
-            verdict=_told(late, single),
+            verdict=verdict_by(late, single),
             why=f"is {abs(value):.2f} s {side}, against all other axes",
             remedy="; or ".join(
                 part
                 for part in (
                     "shift that column alone, by so many samples: no setting does",
-                    _or(late, single),
+                    or_else(late, single),
                 )
                 if part
             ),
@@ -274,208 +180,6 @@ def _scaled(name: str, found: Slope, verdict: Verdict, rival: str) -> Finding:
     remedy = "; or ".join(part for part in (remedy, rival) if part)
     kind = "gyro" if name in GYRO else "accel"
     return replace(_finding(name, found, verdict, why, remedy), setting=f"imu.scale.{kind}")
-
-
-def _told(name: str, single: Single) -> Verdict:
-    """The judgement of what the fit sets free; what others that came after it explain is no fault."""
-    if single.off(name) > CERTAIN:
-        return "surely wrong"
-    if name in SLOW and single.off(name) < LIKELY:
-        return "could not be judged"  # springs do as much
-    return "likely wrong" if distance(name, *single.told[name], 0.0) > LIKELY else "could not be judged"
-
-
-def _or(name: str, single: Single) -> str:
-    """What explains the ride nearly as well as the last that was set free."""
-    if name != single.free[-1] or not single.rivals:
-        return ""
-    return "this ride hardly tells it from " + " or ".join(_words(rival) for rival in single.rivals)
-
-
-def _words(name: str) -> str:
-    """One of `SINGLE` in words."""
-    if name in GAINS:
-        return f"another factor of {AXES[OF_CHANNEL[GAINS.index(name)]].name}"
-    if name in LATES:
-        return f"{AXES[OF_CHANNEL[LATES.index(name)]].name}, late"
-    if name in SLOW:
-        return f"a low-pass in the {SENSORS[name]}"
-    if name in TURNS:
-        return f"a gyro that is turned against the accelerometer ({name.removeprefix('gyro_')})"
-    return "another factor of the accelerometer" if name == ACCEL_GAIN else "stamps whose second is none"
-
-
-def of_all(name: str, single: Single) -> Finding:
-    """The finding of a sensor, or of the time, that the fit has set free."""
-    value, sd = single.told[name]
-    if name in TURNS:
-        return _apart(name, value, sd, single)
-    if name in THEN:
-        return _changes(name, value, sd, single)
-    if name in (*RAMPS, *CUTS):
-        return _unsteady(name, value, sd, single)
-    if name == PACE:
-        quantity, unit, nominal, field, setting = "pace of the time", "1", 1.0, "imu.units.time", ""
-        why = (
-            f"the time stamps run {value:.4g} times as fast as the ride, by its curves, its push and its way"
-        )
-        remedy = (
-            "mend units.time, tick_rate_hz or rate_hz of all its files: one of its seconds is "
-            f"{1.0 / value:.4g} s"
-        )
-    elif name == ACCEL_GAIN:
-        quantity, unit, nominal, field = ALL_ACCEL, "1", 1.0, "imu.accel"
-        setting, remedy = "imu.scale.accel", ""
-        why = f"shows {value:.3g} times the push, the curves and gravity"
-    else:
-        sensor, key = SENSORS[name], name.removeprefix("slow_")
-        quantity, unit, nominal, field, setting = f"low-pass in the {sensor}", "s", 0.0, f"imu.{key}", ""
-        why = (
-            f"a low-pass of {1.0 / (2.0 * math.pi * value):.2g} Hz (of the first order) makes the {sensor} "
-            f"{value:.2f} s late, and takes off what is faster"
-        )
-        remedy = (
-            f"set a wider bandwidth of the device; for the lag alone imu.{key}.time_offset_s = {-value:.2f}"
-        )
-    remedy = "; or ".join(part for part in (remedy, _or(name, single)) if part)
-    return Finding(
-        quantity,
-        name,
-        value,
-        sd,
-        nominal,
-        unit,
-        "all of the ride",
-        _told(name, single),
-        why,
-        setting,
-        field,
-        remedy,
-    )
-
-
-def _apart(name: str, value: float, sd: float, single: Single) -> Finding:
-    """The finding of a gyro whose axes are turned against the accelerometer's."""
-    angle, by = name.removeprefix("gyro_"), math.degrees(1.0)
-    value = math.remainder(value, 2.0 * math.pi)
-    return Finding(
-        f"{angle} of the gyro beside the accelerometer",
-        name,
-        value * by,
-        sd * by,
-        0.0,
-        "deg",
-        "all of the ride",
-        _told(name, single),
-        f"the gyro is turned by {value * by:+.1f} deg of {angle} against the accelerometer, by how the line "
-        "rolls and bends",
-        f"imu.gyro.{angle}_deg",
-        f"imu.gyro.{angle}_deg",
-        _or(name, single),
-    )
-
-
-def _changes(name: str, value: float, sd: float, single: Single) -> Finding:
-    """The finding of what changes within a ride."""
-    of, by, unit = THEN[name], 1.0, "1"
-    cut = f"cut the recording at time_s = {single.changed_s:.4g}"
-    if of in ("roll", "pitch", "yaw"):
-        by, unit, field = math.degrees(1.0), "deg", f"imu.{of}_deg"
-        quantity, why = (
-            f"change of the {of} of the mounting",
-            f"the device has {value * by:+.1f} deg more of {of}",
-        )
-        remedy = f"{cut} and give each part its own {of}_deg; fasten the device"
-    elif of == "offset":
-        unit, field, quantity = "s", "imu.time_s", "jump of the clock"
-        side = "samples of the IMU are missing" if value < 0.0 else "the IMU has samples too many"
-        why = f"way and IMU are {abs(value):.2f} s apart, by their stamps: {side}"
-        remedy = f"{cut}, or give what follows its own stamps: samples that are numbered in a row hide a gap"
-    elif of == "wheel":
-        return _counts(Slope(value, sd), single)
-    else:
-        column = dict(zip((name for name in THEN if "bias" in name), OF_CHANNEL, strict=True))[name]
-        axis, field = AXES[column].name.removesuffix(" alone"), f"imu.{column}"
-        by, unit = (math.degrees(1.0), "deg/s") if column in GYRO else (1.0, "m/s2")
-        quantity, why = (
-            f"jump of the offset of {axis}",
-            f"the offset of {axis} is {value * by:+.3g} {unit} more",
-        )
-        remedy = f"{cut}; log raw samples, without an automatic zero"
-        if column in ACCEL:
-            tilt = abs(math.degrees(math.asin(min(1.0, abs(value) / G))))
-            why += f", as a tilt of {tilt:.2g} deg would make it"
-            remedy += "; fasten the device"
-    return Finding(
-        quantity,
-        name,
-        value * by,
-        sd * by,
-        0.0,
-        unit,
-        "all of the ride",
-        _told(name, single),
-        f"from time_s = {single.changed_s:.4g} on {why}",
-        field=field,
-        remedy=remedy,
-    )
-
-
-def _counts(change: Slope, single: Single) -> Finding:
-    """The finding of a wheel that counts otherwise from a moment on: per metre, over those before."""
-    begun = single.found.value("wheel")
-    counts = begun / (begun + change.value)
-    sd = counts**2 * change.sd / abs(begun)
-    cut = f"cut the recording at time_s = {single.changed_s:.4g}"
-    if counts < 0.0:
-        why = f"the wheel counts backwards ({counts:.2f} of before)"
-        remedy = f"{cut} and set reverse for what follows, or else for what was; mend the counter's wiring"
-    else:
-        why = f"the wheel counts {counts:.3g} times as much for a metre as before"
-        remedy = f"{cut} and give each part its own radius or pulses; mend the wiring of the counter"
-    return Finding(
-        "counts for a metre, over those before",
-        "then_wheel",
-        counts,
-        sd,
-        1.0,
-        "1",
-        "all of the ride",
-        _told("then_wheel", single),
-        f"from time_s = {single.changed_s:.4g} on {why}",
-        field=single.way,
-        remedy=remedy,
-    )
-
-
-def _unsteady(name: str, value: float, sd: float, single: Single) -> Finding:
-    """The finding of a sensor whose offset grows in the ride, or that takes off what is slow."""
-    if name in RAMPS:
-        column = OF_CHANNEL[RAMPS.index(name)]
-        by, unit = (math.pi / 180.0, "deg/s") if column in GYRO else (1.0, "m/s2")
-        axis = AXES[column].name.removesuffix(" alone")
-        quantity, field = f"growth of the offset of {axis}", f"imu.{column}"
-        why = f"the offset of {axis} grows by {value / by:.3g} {unit} in the ride"
-        remedy = "take off what it shows at stops before and after; let the device warm up before a ride"
-    else:
-        sensor, key = ("gyro", "gyro") if name == CUTS[0] else ("accelerometer", "accel")
-        by, unit, quantity, field = 1.0, "rad/s", f"high-pass in the {sensor}", f"imu.{key}"
-        why = f"a high-pass of {1.0 / value:.2g} s takes off what the {sensor} shows longer"
-        remedy = "log raw samples: no automatic zero, no 'linear acceleration', no AC coupling"
-    return Finding(
-        quantity,
-        name,
-        value / by,
-        sd / by,
-        0.0,
-        unit,
-        "all of the ride",
-        _told(name, single),
-        why,
-        "",
-        field,
-        remedy,
-    )
 
 
 def _upright(recording: Recording, single: Single | None) -> Finding:
@@ -562,11 +266,6 @@ def _keys(*groups: Sequence[str]) -> set[str]:
     return {key_of(name) for group in groups for name in group}
 
 
-def key_of(name: str) -> str:
-    """Key of the finding of an axis."""
-    return f"alone_{name}"
-
-
 def _judged(name: str, found: Slope) -> Finding:
     """What is found of one axis."""
     of = AXES[name].of
@@ -603,22 +302,3 @@ def _finding(name: str, found: Slope, verdict: Verdict, why: str = "", remedy: s
         field=f"imu.{name}",
         remedy=remedy,
     )
-
-
-def slope(measured: FloatArray, expected: FloatArray, least: float = 0.0) -> Slope:
-    """Slope of the least-squares line measured = a + slope * expected; unknown below a least rms of these."""
-    x, y = expected - expected.mean(), measured - measured.mean()
-    power = float(x @ x)
-    if power <= len(x) * least**2:
-        return Slope(1.0, math.inf)
-    found = float(x @ y) / power
-    rest = y - found * x
-    return Slope(found, float(np.sqrt(rest @ rest / len(x) / power)))
-
-
-def means(values: FloatArray, count: int) -> FloatArray:
-    """Means (n // count,) of a signal over `count` samples each; of all of it, if it is shorter."""
-    count = min(count, len(values))
-    whole = len(values) // count * count
-    found: FloatArray = values[:whole].reshape(-1, count).mean(axis=1)
-    return found

@@ -13,9 +13,9 @@ from scipy.stats import poisson
 from simrail.core.columns import ACCEL, GYRO
 from simrail.core.jit import FloatArray
 from simrail.recording.check_samples import LIVING
-from simrail.recording.evidence.axes import LEAST as LEAST_RMS
-from simrail.recording.evidence.axes import expected_of, seconds_of
 from simrail.recording.evidence.finding import Finding
+from simrail.recording.evidence.slopes import LEAST as LEAST_RMS
+from simrail.recording.evidence.slopes import expected_of, seconds_of
 from simrail.recording.recording import Recording
 
 LEAST, BELOW = 4, 20

@@ -13,9 +13,10 @@ import numpy as np
 
 from simrail.core.columns import ACCEL, GYRO
 from simrail.core.jit import FloatArray
-from simrail.recording.evidence.axes import LEAST, expected_of, seconds_of, weigh_axes
+from simrail.recording.evidence.axes import weigh_axes
 from simrail.recording.evidence.finding import Finding
 from simrail.recording.evidence.judge import Evidence, is_near_sound, weigh
+from simrail.recording.evidence.slopes import LEAST, expected_of, seconds_of
 from simrail.recording.recording import Recording
 
 MARGIN = 0.1
