@@ -21,6 +21,7 @@ from simrail.recording.evidence.line import K3
 from simrail.recording.evidence.model import (
     GYRO_Z,
     INDEX,
+    SLOW,
     Motion,
     Ride,
     motion,
@@ -89,6 +90,9 @@ OF_GYRO, OF_ACCEL = "imu.gyro.time_offset_s", "imu.accel.time_offset_s"
 
 OF_WHEEL = ("wheel", "offset", "drift")
 """What nothing but the push of a wheel tells on a straight line: there a wheel that slides tells nothing."""
+
+OF_CLOCKS = ("offset", "drift", "gyro_offset")
+"""What tells clocks."""
 
 ALIKE = ("gyro", "shift")
 """What a gyro that is late may look like on a ride that tells little."""
@@ -184,8 +188,7 @@ def weigh(recording: Recording) -> Evidence:
         if best is one and key in ("gyro_offset", "offset", *ALIKE):
             finding = _beside_a_late_gyro(finding, two, slack[key], ride)
         findings.append(finding)
-    if ride.drift:
-        findings = [_counted(finding, ride) if finding.key == "drift" else finding for finding in findings]
+    findings = [_qualified(finding, single, ride) for finding in findings]
     middle = ride.middle_s - float(ride.way.time_s[0])
     return Evidence(tuple(findings), turn, float(push), middle, single)
 
@@ -296,6 +299,22 @@ def _beside_slides(finding: Finding, slides: tuple[Slide, ...], ride: Ride) -> F
     )
     why = f"the wheel spins or slides at {times}, and no curve tells more"
     return _unjudged(finding.key, math.inf, "nothing", why)
+
+
+def _qualified(finding: Finding, single: Single, ride: Ride) -> Finding:
+    """A finding beside what else the ride has: stamps that were counted, or springs.
+
+    Where a low-pass explains a ride that may be springs, which are late by themselves, what is late and what
+    drifts share what the springs do, and the fit has of that a low-pass of the first order alone. A clock is
+    believed wrong then if it surely is.
+    """
+    if ride.drift and finding.key == "drift":
+        return _counted(finding, ride)
+    on_springs = any(name in SLOW and single.off(name) < LIKELY for name in single.free)
+    if not on_springs or finding.key not in OF_CLOCKS or finding.verdict != "likely wrong":
+        return finding
+    why = "the body hangs on springs, or is behind a low-pass: both are late by themselves"
+    return replace(finding, verdict="could not be judged", why=why, setting="", remedy="")
 
 
 def _counted(finding: Finding, ride: Ride) -> Finding:
