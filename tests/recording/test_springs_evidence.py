@@ -1,13 +1,16 @@
-"""Springs pass for a low-pass of the accelerometer: what clocks say beside that is believed if it is sure."""
+"""What bodies do that looks like clocks: springs that pass for a low-pass, and a place ahead of the middle."""
 
 from __future__ import annotations
 
+import math
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from simrail.recording.evidence.finding import LIKELY, Finding, Verdict, verdict_of
 from simrail.recording.evidence.judge import _qualified
+from simrail.recording.evidence.slack import clock_slack
 
 SDS = {"sound": 1.0, "likely wrong": 4.0, "surely wrong": 9.0}
 
@@ -45,3 +48,14 @@ def test_a_likely_clock_beside_springs_could_not_be_judged(
     else:
         assert told == before
     assert told.verdict == wanted
+
+
+@pytest.mark.parametrize("ahead_m", [0.0, 5.0, -9.5])
+def test_a_gyro_may_be_late_by_half_its_way_from_the_middle_of_the_body(ahead_m: float) -> None:
+    """By hand, at 20 m/s and 250 Hz."""
+    recording = SimpleNamespace(
+        mount_position_m=(ahead_m, 0.0, 1.0), imu_sheet=SimpleNamespace(rate_hz=250.0)
+    )
+    ride = SimpleNamespace(recording=recording, way=SimpleNamespace(speed_mps=np.array([0.0, -20.0, 12.0])))
+    parts = (0.1, 0.7 / 20.0, 0.5 * ahead_m / 20.0, 0.002)
+    assert clock_slack(ride) == pytest.approx(math.sqrt(sum(part**2 for part in parts)))  # type: ignore[arg-type]

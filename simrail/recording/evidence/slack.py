@@ -54,9 +54,16 @@ _DEG = math.pi / 180.0
 
 
 def clock_slack(ride: Ride) -> float:
-    """How far the clocks of a sound IMU's sensors may be apart, s."""
+    """How far the clocks of a sound IMU's sensors may be apart, s.
+
+    A gyro shows the turn of a body, as at its middle, and an accelerometer what its own place feels: ahead of
+    the middle that comes earlier.
+    """
     fastest = max(float(np.abs(ride.way.speed_mps).max()), 0.1)
-    return math.hypot(CLOCK_SD_S, CLOCK_SD_M / fastest, 0.5 / ride.recording.imu_sheet.rate_hz)
+    ahead = AHEAD_SHARE * ride.recording.mount_position_m[0]
+    return math.hypot(
+        CLOCK_SD_S, CLOCK_SD_M / fastest, ahead / fastest, 0.5 / ride.recording.imu_sheet.rate_hz
+    )
 
 
 def slack_of(ride: Ride, found: Fit) -> dict[str, float]:
