@@ -1,4 +1,4 @@
-"""What bodies do that looks like clocks: springs that pass for a low-pass, and a place ahead of the middle."""
+"""What bodies do that looks like clocks: springs are a low-pass, and a place ahead of the middle comes first."""
 
 from __future__ import annotations
 
