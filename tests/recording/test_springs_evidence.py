@@ -1,4 +1,4 @@
-"""What bodies do that looks like clocks: springs are a low-pass, and a place ahead of the middle comes first."""
+"""What bodies do that looks like clocks: springs are a low-pass, a place ahead of the middle comes first."""
 
 from __future__ import annotations
 
